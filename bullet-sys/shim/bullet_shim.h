@@ -1,0 +1,172 @@
+/* Thin C interface over Bullet's float64 Featherstone multibodies.
+ *
+ * Conventions, for every function below:
+ *  - Units are the caller's; sfers uses CGS (cm, g, s, dyn). Frames are world frames, right-handed; quaternions are x, y, z, w.
+ *  - Arrays travel as pointer and length; a length that does not match the object is refused with BS_ERROR_ARGUMENT.
+ *  - Return value: BS_OK or one of the BS_ERROR_ codes. On an error the world is as it was, save where a function says otherwise.
+ *  - `error`, `error_length`: buffer of the caller for a NUL-terminated message. Nullable.
+ *  - Threads: a world may be used from any thread, by one at a time. Worlds share no mutable state. Of Bullet's globals one is
+ *    written, once and under a lock, by the first world: gDbvtMargin = 0, as PyBullet does.
+ *  - No C++ exception leaves these functions.
+ */
+#ifndef BULLET_SHIM_H
+#define BULLET_SHIM_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- identity ------------------------------------------------------------------------------------------------------ */
+
+/* Raised whenever a signature, a structure or a constant of this header changes. */
+#define BS_ABI_VERSION 1
+
+#define BS_OK 0
+#define BS_ERROR_ARGUMENT 1  /* a null pointer, a wrong length, an index out of range, a value that Bullet would assert on */
+#define BS_ERROR_MEMORY 2    /* an allocation failed; the world must not be used further */
+#define BS_ERROR_INTERNAL 3  /* an exception of another kind; the world must not be used further */
+#define BS_ERROR_SNAPSHOT 4  /* a snapshot does not belong to a world of this make-up */
+
+/* The BS_ABI_VERSION that the shim was compiled with. */
+int32_t bs_abi_version(void);
+/* sizeof(btScalar) of the headers the shim was compiled with: 8. */
+int32_t bs_scalar_size(void);
+/* Bullet's version number in the headers at compile time: 324 for 3.24. */
+int32_t bs_bullet_version(void);
+/* The precision of the *linked* library, asked of the library itself: 8 (double), 4 (single) or 0 (unknown). */
+int32_t bs_linked_scalar_size(void);
+
+/* Layout of the structures below as the C++ compiler sees it: sizeof(bs_settings), sizeof(bs_link), sizeof(bs_contact), and
+ * the offset of the last member of each. sizes: 6 values. */
+void bs_layout(int32_t *sizes, int32_t length);
+
+/* ---- world --------------------------------------------------------------------------------------------------------- */
+
+typedef struct bs_world bs_world;
+
+/* Solver settings. Every field is handed to the member of btContactSolverInfo, or to the call of Bullet, named beside it. */
+typedef struct bs_settings {
+  double gravity[3];                       /* setGravity (cm/s^2) */
+  double erp2;                             /* m_erp2: share of a contact's penetration that a step removes */
+  double friction_erp;                     /* m_frictionERP */
+  double linear_slop;                      /* m_linearSlop (cm) */
+  double warmstarting_factor;              /* m_warmstartingFactor */
+  double least_squares_residual_threshold; /* m_leastSquaresResidualThreshold: iteration stops below it */
+  double broadphase_velocity_prediction;   /* btDbvtBroadphase::setVelocityPrediction */
+  int32_t solver_iterations;               /* m_numIterations */
+  int32_t minimum_solver_batch_size;       /* m_minimumSolverBatchSize */
+  int32_t force_update_all_aabbs;          /* setForceUpdateAllAabbs, 0 or 1 */
+  int32_t reserved;                        /* 0 */
+} bs_settings;
+
+/* Creates an empty world. settings: copied. world: receives the handle; the caller frees it with bs_world_destroy. */
+int32_t bs_world_create(const bs_settings *settings, bs_world **world, char *error, int32_t error_length);
+
+/* Frees the world and all in it: constraints, then multibodies and colliders, then shapes. Nullable: world. */
+void bs_world_destroy(bs_world *world);
+
+/* Advances by `time_step` (s): Bullet's stepSimulation(time_step, 0), one step of just that length. Torques set before are used up. */
+int32_t bs_world_step(bs_world *world, double time_step, char *error, int32_t error_length);
+
+/* Sets the gravity (cm/s^2). gravity: 3 values. */
+int32_t bs_world_set_gravity(bs_world *world, const double *gravity);
+
+/* ---- multibody ----------------------------------------------------------------------------------------------------- */
+
+/* One body of a tree: a box whose centre of mass is its centre. The base is a bs_link too; it has no joint. */
+typedef struct bs_link {
+  double mass;                    /* (g); the inertia is Bullet's own for the box */
+  double half_extents[3];         /* of the collision box (cm) */
+  double parent_com_to_joint[3];  /* from the parent's centre of mass to the joint (cm), in the parent's frame */
+  double joint_to_com[3];         /* from the joint to this body's centre of mass (cm), in this body's frame */
+  double axis[3];                 /* hinge axis, unit, in this body's frame */
+  double friction;                /* lateral friction of the collider (-) */
+  double collision_margin;        /* (cm) */
+  int32_t parent;                 /* index of the parent link, -1 for the base */
+  int32_t reserved;               /* 0 */
+} bs_link;
+
+/* Adds a multibody of boxes on hinges, at rest in its zero configuration with the base's centre of mass at `base_position`.
+ * It never sleeps, its links do not collide with one another, its linear and angular damping are 0.
+ * base: body without a joint. links: link_count entries, each after its parent. body: receives its index, counting from 0. */
+int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *links, int32_t link_count,
+                         const double *base_position, int32_t *body, char *error, int32_t error_length);
+
+/* Adds a static ground: a multibody without links, fixed, whose collider is a compound with one box.
+ * half_extents: 3 values (cm). top: height (z, cm) of the origin, which lies at the centre of the box's upper face. */
+int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, double friction, double collision_margin,
+                      int32_t *body, char *error, int32_t error_length);
+
+/* Ties the base of `body` to the world where it stands, with a 6-row constraint of at most `max_impulse` (dyn s) a row. */
+int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impulse, char *error, int32_t error_length);
+
+/* Reads all joints at once. angles (rad), rates (rad/s): `length` values each, one per link. */
+int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length);
+
+/* Sets all joints at once, and the cached joint frames with them. The colliders keep their place until the next step. */
+int32_t bs_joint_states_set(bs_world *world, int32_t body, const double *angles, const double *rates, int32_t length);
+
+/* Sets the torque (dyn cm) on every joint for the coming step. torques: `length` values. */
+int32_t bs_joint_torques_set(bs_world *world, int32_t body, const double *torques, int32_t length);
+
+/* Base: centre of mass (cm), orientation (quaternion, base to world), velocity (cm/s) and angular velocity (rad/s).
+ * state: 13 values. Current, unlike bs_link_states. */
+int32_t bs_base_state(const bs_world *world, int32_t body, double *state, int32_t length);
+
+/* Sets what bs_base_state reads. state: 13 values; the quaternion must be of unit length. */
+int32_t bs_base_state_set(bs_world *world, int32_t body, const double *state, int32_t length);
+
+/* Links, as cached by the last step (they lag one step behind the joints, as in PyBullet without computeForwardKinematics).
+ * Each link takes 15 values: centre of mass (3, cm), rotation matrix link to world by rows (9), velocity of the centre of mass (3, cm/s).
+ * The velocity is of the current joint rates, turned by the cached rotation. */
+int32_t bs_link_states(bs_world *world, int32_t body, double *states, int32_t length);
+
+/* Angular velocities (rad/s) that go with bs_link_states: 3 values a link. */
+int32_t bs_link_angular_velocities(bs_world *world, int32_t body, double *rates, int32_t length);
+
+/* The velocity that Bullet clamps every generalised velocity of `body` to (btMultiBody::getMaxCoordinateVelocity), and the largest
+ * magnitude of a generalised velocity now (cm/s or rad/s). Equal values mean that the clamp has bitten. */
+int32_t bs_velocity_clamp(const bs_world *world, int32_t body, double *limit, double *largest);
+
+/* ---- contacts ------------------------------------------------------------------------------------------------------ */
+
+/* One contact point of the last step. link_a, link_b: -1 is the base. */
+typedef struct bs_contact {
+  double position_on_b[3];  /* (cm), world */
+  double normal_on_b[3];    /* unit, from b towards a */
+  double distance;          /* (cm), negative where the boxes overlap */
+  double normal_impulse;    /* of the last step (dyn s), >= 0 */
+  double friction_impulse[2];
+  double friction_direction_1[3];
+  double friction_direction_2[3];
+  int32_t body_a;
+  int32_t link_a;
+  int32_t body_b;
+  int32_t link_b;
+} bs_contact;
+
+/* Copies at most `capacity` contact points; count receives how many there are in all. contacts: Nullable when capacity is 0. */
+int32_t bs_contacts(const bs_world *world, bs_contact *contacts, int32_t capacity, int32_t *count);
+
+/* ---- snapshots ----------------------------------------------------------------------------------------------------- */
+
+/* A snapshot holds everything that a later step depends on, as doubles (integers are exact in them): joint and base state, cached
+ * transforms, broadphase trees, overlapping pairs and contact points with their impulses, each in Bullet's order. */
+
+/* Number of doubles that a snapshot of the world takes now. */
+int32_t bs_snapshot_size(const bs_world *world, int32_t *size);
+
+/* Writes a snapshot. data: `length` values, at least bs_snapshot_size. */
+int32_t bs_snapshot_take(const bs_world *world, double *data, int32_t length, char *error, int32_t error_length);
+
+/* Puts the world back, so that it continues with the same bits. The world may be another one, built by the same calls.
+ * A snapshot of another make-up is refused before anything changes; after BS_ERROR_MEMORY or BS_ERROR_INTERNAL destroy the world. */
+int32_t bs_snapshot_restore(bs_world *world, const double *data, int32_t length, char *error, int32_t error_length);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* BULLET_SHIM_H */

@@ -1,0 +1,287 @@
+// Multibodies: building them in the order that PyBullet uses (it decides the order of contacts and so the last bits), and
+// reading and writing their state.
+#include "internal.h"
+
+namespace {
+
+using bs::Body;
+using bs::require;
+
+std::unique_ptr<btBoxShape> box(const double *half_extents, double margin) {
+  for (int i = 0; i < 3; ++i) require(half_extents[i] > 0, "a half extent must be positive");
+  auto shape = std::make_unique<btBoxShape>(bs::vector(half_extents));
+  shape->setMargin(margin);
+  return shape;
+}
+
+btVector3 inertia_of(const btCollisionShape &shape, double mass) {
+  btVector3 inertia(0, 0, 0);
+  shape.calculateLocalInertia(mass, inertia);
+  return inertia;
+}
+
+// Makes the collider of `link` (-1: base), adds it to the world at `origin` and lists it in `body`.
+btMultiBodyLinkCollider &add_collider(bs_world &world, Body &body, int link, btCollisionShape &shape, const btVector3 &origin,
+                                      bool is_static) {
+  body.colliders.push_back(std::make_unique<btMultiBodyLinkCollider>(body.multibody.get(), link));
+  btMultiBodyLinkCollider &collider = *body.colliders.back();
+  collider.setCollisionShape(&shape);
+  btTransform transform;
+  transform.setIdentity();
+  transform.setOrigin(origin);
+  collider.setWorldTransform(transform);
+  const int group = is_static ? int(btBroadphaseProxy::StaticFilter) : int(btBroadphaseProxy::DefaultFilter);
+  const int mask = is_static ? int(btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter) : int(btBroadphaseProxy::AllFilter);
+  world.dynamics.addCollisionObject(&collider, group, mask);
+  if (link < 0) {
+    body.multibody->setBaseCollider(&collider);
+  } else {
+    body.multibody->getLink(link).m_collider = &collider;
+  }
+  return collider;
+}
+
+// Last part of building: place the base, spread the transforms to the links and colliders, hand over to the world.
+void finish(bs_world &world, Body &body, const btVector3 &base_position) {
+  btMultiBody &multibody = *body.multibody;
+  multibody.setHasSelfCollision(false);
+  multibody.finalizeMultiDof();
+  btTransform base;
+  base.setIdentity();
+  base.setOrigin(base_position);
+  multibody.setBaseWorldTransform(base);
+  btAlignedObjectArray<btQuaternion> scratch_rotations;
+  btAlignedObjectArray<btVector3> scratch_origins;
+  multibody.forwardKinematics(scratch_rotations, scratch_origins);
+  multibody.updateCollisionObjectWorldTransforms(scratch_rotations, scratch_origins);
+  world.dynamics.addMultiBody(&multibody);
+  multibody.setLinearDamping(0);
+  multibody.setAngularDamping(0);
+}
+
+// Takes a half-built body out of the world again when building fails on the way.
+class Building {
+ public:
+  explicit Building(bs_world &world) : world_(world) { world.bodies.emplace_back(); }
+  ~Building() {
+    if (done_) return;
+    Body &body = world_.bodies.back();
+    if (body.multibody) world_.dynamics.removeMultiBody(body.multibody.get());
+    for (auto &collider : body.colliders) world_.dynamics.removeCollisionObject(collider.get());
+    world_.bodies.pop_back();
+  }
+  Body &body() { return world_.bodies.back(); }
+  int32_t commit() {
+    done_ = true;
+    return static_cast<int32_t>(world_.bodies.size()) - 1;
+  }
+
+ private:
+  bs_world &world_;
+  bool done_ = false;
+};
+
+void check(const bs_link &link) {
+  require(link.mass > 0, "a mass must be positive");
+  require(link.collision_margin > 0, "a collision margin must be positive");
+  require(link.friction >= 0, "a friction coefficient must not be negative");
+}
+
+}  // namespace
+
+extern "C" {
+
+int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *links, int32_t link_count,
+                         const double *base_position, int32_t *body_index, char *error, int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(world != nullptr && base != nullptr && base_position != nullptr && body_index != nullptr, "null pointer");
+    require(link_count == 0 || links != nullptr, "null pointer");
+    require(link_count >= 0, "a negative number of links");
+    check(*base);
+    for (int32_t i = 0; i < link_count; ++i) {
+      check(links[i]);
+      require(links[i].parent >= -1 && links[i].parent < i, "a link's parent must stand before it");
+      require(btFabs(bs::vector(links[i].axis).length2() - 1.0) < 1e-9, "a hinge axis must be of unit length");
+    }
+
+    Building building(*world);
+    Body &body = building.body();
+    body.shapes.push_back(box(base->half_extents, base->collision_margin));
+    body.multibody = std::make_unique<btMultiBody>(link_count, base->mass, inertia_of(*body.shapes[0], base->mass), false, false);
+    btMultiBody &multibody = *body.multibody;
+    multibody.setBaseWorldTransform(btTransform::getIdentity());
+    const btVector3 origin = bs::vector(base_position);
+    add_collider(*world, body, -1, *body.shapes[0], origin, false);
+
+    // Centre of mass of every body so far, in the zero configuration: all frames are parallel to the world's.
+    std::vector<btVector3> centres{origin};
+    for (int32_t i = 0; i < link_count; ++i) {
+      const bs_link &link = links[i];
+      body.shapes.push_back(box(link.half_extents, link.collision_margin));
+      btCollisionShape &shape = *body.shapes.back();
+      multibody.setupRevolute(i, link.mass, inertia_of(shape, link.mass), link.parent, btQuaternion(0, 0, 0, 1), bs::vector(link.axis),
+                              bs::vector(link.parent_com_to_joint), bs::vector(link.joint_to_com), true);
+      const btVector3 joint = centres[static_cast<size_t>(link.parent + 1)] + bs::vector(link.parent_com_to_joint);
+      centres.push_back(joint + bs::vector(link.joint_to_com));
+      add_collider(*world, body, i, shape, joint, false);
+    }
+    finish(*world, body, origin);
+    // Frictions after everything else, base first, as the reference sets them.
+    body.colliders[0]->setFriction(base->friction);
+    for (int32_t i = 0; i < link_count; ++i) body.colliders[static_cast<size_t>(i) + 1]->setFriction(links[i].friction);
+    *body_index = building.commit();
+  });
+}
+
+int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, double friction, double collision_margin,
+                      int32_t *body_index, char *error, int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(world != nullptr && half_extents != nullptr && body_index != nullptr, "null pointer");
+    require(collision_margin > 0, "a collision margin must be positive");
+    require(friction >= 0, "a friction coefficient must not be negative");
+    Building building(*world);
+    Body &body = building.body();
+    body.shapes.push_back(box(half_extents, collision_margin));
+    auto compound = std::make_unique<btCompoundShape>();
+    btTransform child;
+    child.setIdentity();
+    child.setOrigin(btVector3(0, 0, -half_extents[2]));
+    compound->addChildShape(child, body.shapes[0].get());
+    compound->setMargin(collision_margin);
+    btCompoundShape &shape = *compound;
+    body.shapes.push_back(std::move(compound));
+    body.multibody = std::make_unique<btMultiBody>(0, btScalar(0), btVector3(0, 0, 0), true, false);
+    const btVector3 origin(0, 0, top);
+    add_collider(*world, body, -1, shape, origin, true);
+    finish(*world, body, origin);
+    body.colliders[0]->setFriction(friction);
+    *body_index = building.commit();
+  });
+}
+
+int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impulse, char *error, int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(world != nullptr, "null pointer");
+    require(max_impulse > 0, "the largest impulse must be positive");
+    btMultiBody &multibody = world->multibody(body);
+    const btTransform base = multibody.getBaseWorldTransform();
+    btRigidBody *no_rigid_body = nullptr;
+    auto constraint = std::make_unique<btMultiBodyFixedConstraint>(&multibody, -1, no_rigid_body, btVector3(0, 0, 0), base.getOrigin(),
+                                                                   btMatrix3x3::getIdentity(), base.getBasis());
+    constraint->setMaxAppliedImpulse(max_impulse);
+    world->constraints.push_back(std::move(constraint));
+    world->dynamics.addMultiBodyConstraint(world->constraints.back().get());
+  });
+}
+
+int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && angles != nullptr && rates != nullptr, "null pointer");
+    const btMultiBody &multibody = world->multibody(body);
+    require(length == multibody.getNumLinks(), "one value per link");
+    for (int i = 0; i < length; ++i) {
+      angles[i] = multibody.getJointPos(i);
+      rates[i] = multibody.getJointVel(i);
+    }
+  });
+}
+
+int32_t bs_joint_states_set(bs_world *world, int32_t body, const double *angles, const double *rates, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && angles != nullptr && rates != nullptr, "null pointer");
+    btMultiBody &multibody = world->multibody(body);
+    require(length == multibody.getNumLinks(), "one value per link");
+    for (int i = 0; i < length; ++i) {
+      multibody.setJointPos(i, angles[i]);
+      multibody.setJointVel(i, rates[i]);
+    }
+  });
+}
+
+int32_t bs_joint_torques_set(bs_world *world, int32_t body, const double *torques, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && torques != nullptr, "null pointer");
+    btMultiBody &multibody = world->multibody(body);
+    require(length == multibody.getNumLinks(), "one value per link");
+    for (int i = 0; i < length; ++i) multibody.getLink(i).m_jointTorque[0] = torques[i];
+  });
+}
+
+int32_t bs_base_state(const bs_world *world, int32_t body, double *state, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && state != nullptr, "null pointer");
+    require(length == 13, "a base state is 13 values");
+    const btMultiBody &multibody = world->multibody(body);
+    const btQuaternion rotation = multibody.getWorldToBaseRot().inverse();
+    bs::store(state, multibody.getBasePos());
+    for (int i = 0; i < 4; ++i) state[3 + i] = rotation[i];
+    bs::store(state + 7, multibody.getBaseVel());
+    bs::store(state + 10, multibody.getBaseOmega());
+  });
+}
+
+int32_t bs_base_state_set(bs_world *world, int32_t body, const double *state, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && state != nullptr, "null pointer");
+    require(length == 13, "a base state is 13 values");
+    const btQuaternion rotation(state[3], state[4], state[5], state[6]);
+    require(btFabs(rotation.length2() - 1.0) < 1e-9, "a quaternion must be of unit length");
+    btMultiBody &multibody = world->multibody(body);
+    multibody.setBasePos(bs::vector(state));
+    multibody.setWorldToBaseRot(rotation.inverse());
+    multibody.setBaseVel(bs::vector(state + 7));
+    multibody.setBaseOmega(bs::vector(state + 10));
+  });
+}
+
+// Velocities of all bodies of the tree, each in its own frame (the base's first), into the world's scratch.
+static void tree_velocities(bs_world &world, const btMultiBody &multibody) {
+  const size_t count = static_cast<size_t>(multibody.getNumLinks()) + 1;
+  if (world.scratch_linear.size() < count) {
+    world.scratch_linear.resize(count);
+    world.scratch_angular.resize(count);
+  }
+  multibody.compTreeLinkVelocities(world.scratch_angular.data(), world.scratch_linear.data());
+}
+
+int32_t bs_link_states(bs_world *world, int32_t body, double *states, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && states != nullptr, "null pointer");
+    const btMultiBody &multibody = world->multibody(body);
+    require(length == 15 * multibody.getNumLinks(), "15 values per link");
+    tree_velocities(*world, multibody);
+    for (int i = 0; i < multibody.getNumLinks(); ++i) {
+      const btTransform &transform = multibody.getLink(i).m_cachedWorldTransform;
+      double *out = states + 15 * i;
+      bs::store(out, transform.getOrigin());
+      for (int row = 0; row < 3; ++row) bs::store(out + 3 + 3 * row, transform.getBasis()[row]);
+      bs::store(out + 12, transform.getBasis() * world->scratch_linear[static_cast<size_t>(i) + 1]);
+    }
+  });
+}
+
+int32_t bs_link_angular_velocities(bs_world *world, int32_t body, double *rates, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && rates != nullptr, "null pointer");
+    const btMultiBody &multibody = world->multibody(body);
+    require(length == 3 * multibody.getNumLinks(), "3 values per link");
+    tree_velocities(*world, multibody);
+    for (int i = 0; i < multibody.getNumLinks(); ++i) {
+      bs::store(rates + 3 * i, multibody.getLink(i).m_cachedWorldTransform.getBasis() * world->scratch_angular[static_cast<size_t>(i) + 1]);
+    }
+  });
+}
+
+int32_t bs_velocity_clamp(const bs_world *world, int32_t body, double *limit, double *largest) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && limit != nullptr && largest != nullptr, "null pointer");
+    const btMultiBody &multibody = world->multibody(body);
+    *limit = multibody.getMaxCoordinateVelocity();
+    double found = 0;
+    const btScalar *velocities = multibody.getVelocityVector();
+    for (int i = 0; i < multibody.getNumDofs() + 6; ++i) found = btMax(found, btFabs(velocities[i]));
+    *largest = found;
+  });
+}
+
+}  // extern "C"

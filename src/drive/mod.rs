@@ -1,0 +1,148 @@
+//! What voltage each actuator gets, when.
+//!
+//! A positive voltage bends an actuator's far end up, a negative one down. The piezo can take −1500 V to +520 V in the reference's
+//! model; the real robot was driven with +300 V where the model applies +520 V, which `positive_gain = 1.733` expresses.
+
+pub mod gait;
+mod table;
+
+pub use gait::Gait;
+pub use table::Table;
+
+use std::f64::consts::PI;
+
+/// A voltage waveform for all actuators.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Waveform {
+    /// A gait of five actuators with its period, delay or on-time p (s).
+    Gait {
+        /// Which.
+        gait: &'static Gait,
+        /// Its number p (s); 0 for a gait that takes none.
+        parameter: f64,
+        /// The voltage of each actuator when it is on (V).
+        on_voltages: Vec<f64>,
+    },
+    /// Constant voltages (V).
+    Dc(Vec<f64>),
+    /// `V = A/2 (1 − cos 2πft)`, which starts at rest and reaches A.
+    Sine {
+        /// A of each actuator (V).
+        amplitudes: Vec<f64>,
+        /// f (Hz).
+        frequency: f64,
+    },
+    /// 0 V, then constant voltages.
+    Step {
+        /// The voltages after the step (V).
+        voltages: Vec<f64>,
+        /// When (s).
+        at: f64,
+    },
+    /// Phases of constant voltages, repeated with a period or passed once.
+    Sequence {
+        /// Length of a repetition (s); `None` passes the phases once.
+        period: Option<f64>,
+        /// End (s) and voltages (V) of each phase, in order. The last phase's voltages hold from there on.
+        phases: Vec<(f64, Vec<f64>)>,
+    },
+    /// A table, linear between rows.
+    Table(Table),
+}
+
+/// A waveform and the factor on its positive part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// The waveform.
+    pub waveform: Waveform,
+    /// Factor on positive voltages (–).
+    pub positive_gain: f64,
+}
+
+impl Drive {
+    /// Writes the voltages (V) that reach the torque law at time `t` (s) to `out`, one per actuator.
+    pub fn voltages(&self, t: f64, out: &mut [f64]) {
+        match &self.waveform {
+            Waveform::Gait { gait, parameter, on_voltages } => {
+                let mask = gait.mask(t, *parameter).bytes();
+                for ((out, &on), bit) in out.iter_mut().zip(on_voltages).zip(mask) {
+                    *out = if bit == b'1' { on } else { 0.0 };
+                }
+            }
+            Waveform::Dc(voltages) => out.copy_from_slice(voltages),
+            Waveform::Sine { amplitudes, frequency } => {
+                // The products run from left to right, as in the reference.
+                let swing = 1.0 - (2.0 * PI * frequency * t).cos();
+                for (out, amplitude) in out.iter_mut().zip(amplitudes) {
+                    *out = amplitude / 2.0 * swing;
+                }
+            }
+            Waveform::Step { voltages, at } => {
+                if t < *at {
+                    out.fill(0.0);
+                } else {
+                    out.copy_from_slice(voltages);
+                }
+            }
+            Waveform::Sequence { period, phases } => {
+                let t = period.map_or(t, |period| t % period);
+                if let Some((_, voltages)) = phases.iter().find(|(until, _)| t < *until).or(phases.last()) {
+                    out.copy_from_slice(voltages);
+                }
+            }
+            Waveform::Table(table) => table.at(t, out),
+        }
+        if self.positive_gain != 1.0 {
+            for v in out.iter_mut().filter(|v| **v > 0.0) {
+                *v *= self.positive_gain;
+            }
+        }
+    }
+
+    /// The period of the waveform (s), if it repeats.
+    pub fn period(&self) -> Option<f64> {
+        match &self.waveform {
+            Waveform::Gait { gait, parameter, .. } if !gait.cycle.is_empty() => Some(*parameter),
+            Waveform::Sine { frequency, .. } => Some(1.0 / frequency),
+            Waveform::Sequence { period, .. } => *period,
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(waveform: Waveform, gain: f64, t: f64) -> Vec<f64> {
+        let mut out = vec![f64::NAN; 2];
+        Drive { waveform, positive_gain: gain }.voltages(t, &mut out);
+        out
+    }
+
+    #[test]
+    fn a_sine_starts_at_rest_and_reaches_its_amplitude_in_half_a_period() {
+        let sine = || Waveform::Sine { amplitudes: vec![-1500.0, 300.0], frequency: 10.0 };
+        assert_eq!(at(sine(), 1.0, 0.0), [0.0, 0.0]);
+        assert_eq!(at(sine(), 1.0, 0.05), [-1500.0, 300.0]);
+    }
+
+    #[test]
+    fn the_positive_gain_leaves_negative_voltages_alone() {
+        assert_eq!(at(Waveform::Dc(vec![-1500.0, 300.0]), 1.5, 0.0), [-1500.0, 450.0]);
+    }
+
+    #[test]
+    fn a_step_and_a_sequence_change_where_they_should() {
+        let step = || Waveform::Step { voltages: vec![1.0, 2.0], at: 0.5 };
+        assert_eq!(at(step(), 1.0, 0.49), [0.0, 0.0]);
+        assert_eq!(at(step(), 1.0, 0.5), [1.0, 2.0]);
+        let phases = vec![(0.25, vec![1.0, 0.0]), (0.5, vec![2.0, 0.0])];
+        let repeated = || Waveform::Sequence { period: Some(1.0), phases: phases.clone() };
+        let once = || Waveform::Sequence { period: None, phases: phases.clone() };
+        assert_eq!(at(repeated(), 1.0, 0.3)[0], 2.0);
+        assert_eq!(at(repeated(), 1.0, 0.9)[0], 2.0);
+        assert_eq!(at(repeated(), 1.0, 1.1)[0], 1.0);
+        assert_eq!(at(once(), 1.0, 1.1)[0], 2.0);
+    }
+}

@@ -1,0 +1,75 @@
+//! A voltage table: straight lines between rows, held at both ends.
+
+/// Voltages of all actuators at given times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    times: Vec<f64>,
+    /// Row after row, one value per actuator.
+    voltages: Vec<f64>,
+    actuators: usize,
+}
+
+impl Table {
+    /// A table of `times.len()` rows of `actuators` voltages (V) each. Times (s) must rise strictly.
+    ///
+    /// # Errors
+    /// The index of the first row whose time does not rise, or whose values are not all finite.
+    pub fn new(times: Vec<f64>, voltages: Vec<f64>, actuators: usize) -> Result<Self, usize> {
+        assert_eq!(times.len() * actuators, voltages.len(), "one voltage per actuator and row");
+        for (row, (time, values)) in times.iter().zip(voltages.chunks_exact(actuators.max(1))).enumerate() {
+            let rises = row == 0 || times[row - 1] < *time;
+            if !rises || !time.is_finite() || values.iter().any(|v| !v.is_finite()) {
+                return Err(row);
+            }
+        }
+        Ok(Self { times, voltages, actuators })
+    }
+
+    /// The rows' times (s).
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The voltages (V) of row `row`.
+    pub fn row(&self, row: usize) -> &[f64] {
+        &self.voltages[row * self.actuators..][..self.actuators]
+    }
+
+    /// Writes the voltages (V) at time `t` (s) to `out`.
+    pub fn at(&self, t: f64, out: &mut [f64]) {
+        let after = self.times.partition_point(|&time| time <= t);
+        if after == 0 {
+            out.copy_from_slice(self.row(0));
+        } else if after == self.times.len() {
+            out.copy_from_slice(self.row(after - 1));
+        } else {
+            let (t0, t1) = (self.times[after - 1], self.times[after]);
+            let share = (t - t0) / (t1 - t0);
+            for ((out, &v0), &v1) in out.iter_mut().zip(self.row(after - 1)).zip(self.row(after)) {
+                *out = v0 + share * (v1 - v0);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_linear_between_rows_and_held_at_the_ends() {
+        let table = Table::new(vec![1.0, 2.0, 4.0], vec![0.0, 10.0, 100.0, 20.0, -100.0, 0.0], 2).unwrap();
+        let mut out = [0.0; 2];
+        for (t, expected) in [(0.0, [0.0, 10.0]), (1.5, [50.0, 15.0]), (2.0, [100.0, 20.0]), (3.0, [0.0, 10.0]), (9.0, [-100.0, 0.0])] {
+            table.at(t, &mut out);
+            assert_eq!(out, expected, "at {t}");
+        }
+    }
+
+    #[test]
+    fn rows_out_of_order_or_not_finite_are_refused_by_number() {
+        assert_eq!(Table::new(vec![0.0, 0.0], vec![1.0, 2.0], 1), Err(1));
+        assert_eq!(Table::new(vec![0.0, f64::NAN], vec![1.0, 2.0], 1), Err(1));
+        assert_eq!(Table::new(vec![0.0, 1.0], vec![f64::INFINITY, 2.0], 1), Err(0));
+    }
+}

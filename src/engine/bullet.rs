@@ -1,0 +1,242 @@
+//! The reference's robot on Bullet, bit for bit.
+
+use super::{ClampHits, Engine, EngineError, JointState};
+use crate::actuator::PiezoJoint;
+use crate::analytic;
+use crate::bullet::{BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World};
+use crate::model::{Mount, Robot};
+
+/// Collision margin of every box (cm), as PyBullet sets it for bodies built by its calls.
+const COLLISION_MARGIN: f64 = 0.001;
+/// Half extents of the reference's floor (cm): its plane.urdf, scaled by ten.
+const GROUND_HALF_EXTENTS: [f64; 3] = [1000.0, 1000.0, 50.0];
+/// Largest impulse of the clamp's constraint (dyn·s), PyBullet's default.
+const CLAMP_IMPULSE: f64 = 500.0;
+
+/// A chain of boxes in a world with the reference's solver settings.
+///
+/// Built in the reference's order, because that decides the order of contacts and so the last bits: the chain, then for
+/// [`Mount::Clamped`] the constraint that holds its base, for [`Mount::Ground`] the floor.
+pub struct BulletEngine {
+    world: World,
+    body: BodyId,
+    joint: PiezoJoint,
+    motors_per_actuator: usize,
+    half_link_length: f64,
+    time_step: f64,
+    stable_step: f64,
+    step: u64,
+    state: JointState,
+    links: Vec<LinkState>,
+    clamp_hits: Option<ClampHits>,
+}
+
+impl BulletEngine {
+    /// Builds `robot`, at rest and flat, to be stepped by `time_step` (s).
+    ///
+    /// # Errors
+    /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::Bullet`] if Bullet refuses.
+    pub fn new(robot: &Robot, time_step: f64) -> Result<Self, EngineError> {
+        Self::with_settings(robot, time_step, &SolverSettings::pybullet(robot.material.gravity))
+    }
+
+    /// The same with other solver settings.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_settings(robot: &Robot, time_step: f64, settings: &SolverSettings) -> Result<Self, EngineError> {
+        robot.check()?;
+        let mut world = World::new(settings)?;
+        let boxes = boxes(robot);
+        let body = world.add_multibody(&boxes[0], &boxes[1..], [0.0; 3])?;
+        match robot.mount {
+            Mount::Clamped => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
+            Mount::Ground => {
+                world.add_ground(&Ground {
+                    half_extents: GROUND_HALF_EXTENTS,
+                    top: -0.5 * robot.collision_thickness,
+                    friction: robot.friction.ground,
+                    collision_margin: COLLISION_MARGIN,
+                })?;
+            }
+            Mount::Free => {}
+        }
+        let joints = robot.joints();
+        let zeros = || vec![0.0; joints];
+        Ok(Self {
+            world,
+            body,
+            joint: robot.joint(),
+            motors_per_actuator: robot.motors_per_actuator,
+            half_link_length: robot.half_link_length(),
+            time_step,
+            stable_step: analytic::stable_step(robot),
+            step: 0,
+            state: JointState { angles: zeros(), rates: zeros(), torques: zeros(), motor_voltages: zeros() },
+            links: Vec::with_capacity(joints),
+            clamp_hits: None,
+        })
+    }
+
+    /// The world and the robot's body in it, for looking at contacts and links.
+    pub fn world(&mut self) -> (&mut World, BodyId) {
+        (&mut self.world, self.body)
+    }
+
+    /// Takes a snapshot of the state between two steps.
+    ///
+    /// # Errors
+    /// [`EngineError::Bullet`].
+    pub fn snapshot(&self) -> Result<(u64, Snapshot), EngineError> {
+        Ok((self.step, self.world.snapshot()?))
+    }
+
+    /// Goes back, or on, to a snapshot of an engine of the same robot.
+    ///
+    /// # Errors
+    /// [`EngineError::Bullet`] if it is of another robot.
+    pub fn restore(&mut self, (step, snapshot): &(u64, Snapshot)) -> Result<(), EngineError> {
+        self.world.restore(snapshot)?;
+        self.step = *step;
+        Ok(())
+    }
+
+    fn not_finite(&self, what: String, value: f64) -> EngineError {
+        let time = self.step as f64 * self.time_step;
+        EngineError::NotFinite { what, value, step: self.step, time, stable_step: self.stable_step }
+    }
+
+    /// The first joint whose angle or rate is not a number. Kept out of the loop: it runs once per failure.
+    #[cold]
+    fn find_not_finite(&self) -> EngineError {
+        let JointState { angles, rates, .. } = &self.state;
+        for (i, (&angle, &rate)) in angles.iter().zip(rates).enumerate() {
+            for (what, value) in [("the angle", angle), ("the rate", rate)] {
+                if !value.is_finite() {
+                    return self.not_finite(format!("{what} of joint {}", i + 1), value);
+                }
+            }
+        }
+        self.not_finite("a joint".into(), f64::NAN)
+    }
+}
+
+/// The bodies as boxes whose hinges stand in the faces between them.
+fn boxes(robot: &Robot) -> Vec<BoxLink> {
+    let segments = robot.segments();
+    let half_base = 0.5 * segments[0].length;
+    let boxes = segments.iter().enumerate().map(|(i, segment)| {
+        let half = 0.5 * segment.length;
+        // A link's frame stands in its joint, its centre of mass half its length further; the next joint is a whole length from
+        // the joint, so as far again from the centre of mass.
+        let before = if i == 0 { 0.0 } else { 0.5 * segments[i - 1].length };
+        let to_joint = match i {
+            0 => 0.0,
+            1 => half_base,
+            _ => segments[i - 1].length - before,
+        };
+        BoxLink {
+            parent: i.checked_sub(2),
+            mass: segment.mass,
+            half_extents: [half, 0.5 * robot.material.width, 0.5 * robot.collision_thickness],
+            parent_com_to_joint: [to_joint, 0.0, 0.0],
+            joint_to_com: [if i == 0 { 0.0 } else { half }, 0.0, 0.0],
+            axis: [0.0, 1.0, 0.0],
+            friction: segment.friction,
+            collision_margin: COLLISION_MARGIN,
+        }
+    });
+    boxes.collect()
+}
+
+/// Pitch about +y of a body whose x axis points along (x, z) in the world (rad): positive lowers the far end.
+fn pitch(x: f64, z: f64) -> f64 {
+    (-z).atan2(x)
+}
+
+impl Engine for BulletEngine {
+    fn prepare(&mut self, voltages: &[f64]) -> Result<&JointState, EngineError> {
+        let JointState { angles, rates, torques, motor_voltages } = &mut self.state;
+        self.world.joint_states(self.body, angles, rates)?;
+        let m = self.motors_per_actuator as f64;
+        let mut sum = 0.0;
+        for (actuator, &voltage) in voltages.iter().enumerate() {
+            let motor_voltage = voltage / m;
+            let joints = actuator * self.motors_per_actuator..(actuator + 1) * self.motors_per_actuator;
+            for i in joints {
+                motor_voltages[i] = motor_voltage;
+                torques[i] = self.joint.torque(angles[i], rates[i], motor_voltage);
+                // Zero for finite values, NaN otherwise: one test per step instead of one per joint.
+                sum += 0.0 * angles[i] + 0.0 * rates[i];
+            }
+        }
+        if sum != 0.0 { Err(self.find_not_finite()) } else { Ok(&self.state) }
+    }
+
+    /// The base's pose is current; the joints' positions, and the right end that hangs on the last of them, come from transforms
+    /// that Bullet cached one step earlier. Velocities pair the joints' places with the velocities of the links' centres of mass,
+    /// and the right end's takes a whole half-link as lever from there. All of this is how the reference records.
+    fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
+        let base = self.world.base_state(self.body)?;
+        if let Some(&value) = base.position.iter().chain(&base.velocity).find(|v| !v.is_finite()) {
+            return Err(self.not_finite("the base's position or velocity".into(), value));
+        }
+        self.world.link_states(self.body, &mut self.links)?;
+        let half = self.half_link_length;
+
+        // First column of the base's rotation: its x axis in the world.
+        let [qx, qy, qz, qw] = base.orientation;
+        let p = pitch(1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qz - qw * qy));
+        let lever = half / 2.0;
+        let rate = base.angular_velocity[1];
+        positions[..3].copy_from_slice(&[base.position[0] - lever * p.cos(), 0.0, base.position[2] + lever * p.sin()]);
+        velocities[..3].copy_from_slice(&[
+            base.velocity[0] + lever * p.sin() * rate,
+            0.0,
+            base.velocity[2] + lever * p.cos() * rate,
+        ]);
+
+        let joints = self.links.len();
+        for (i, link) in self.links.iter().enumerate() {
+            // The joint stands half the link's length before its centre of mass, along the link's x axis.
+            let to_com = if i + 1 == joints { 0.5 * half } else { half };
+            for axis in 0..3 {
+                positions[3 * (i + 1) + axis] = link.position[axis] - link.rotation[axis][0] * to_com;
+                velocities[3 * (i + 1) + axis] = link.velocity[axis];
+            }
+        }
+
+        let last = &self.links[joints - 1];
+        let p = pitch(last.rotation[0][0], last.rotation[2][0]);
+        let rate = last.angular_velocity[1];
+        let joint = [positions[3 * joints], 0.0, positions[3 * joints + 2]];
+        let end = 3 * (joints + 1);
+        positions[end..end + 3].copy_from_slice(&[joint[0] + half * p.cos(), 0.0, joint[2] - half * p.sin()]);
+        velocities[end..end + 3].copy_from_slice(&[
+            last.velocity[0] - half * p.sin() * rate,
+            0.0,
+            last.velocity[2] - half * p.cos() * rate,
+        ]);
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(), EngineError> {
+        self.world.set_joint_torques(self.body, &self.state.torques)?;
+        self.world.step(self.time_step)?;
+        let clamp = self.world.velocity_clamp(self.body)?;
+        if clamp.hit() {
+            let hits = self.clamp_hits.get_or_insert(ClampHits { steps: 0, first_step: self.step, limit: clamp.limit });
+            hits.steps += 1;
+        }
+        self.step += 1;
+        Ok(())
+    }
+
+    fn step(&self) -> u64 {
+        self.step
+    }
+
+    fn clamp_hits(&self) -> Option<ClampHits> {
+        self.clamp_hits
+    }
+}

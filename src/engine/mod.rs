@@ -1,0 +1,91 @@
+//! Stepping a robot in time.
+//!
+//! An [`Engine`] knows one robot. Each step begins with [`prepare`](Engine::prepare), which reads the joints and computes the
+//! torques for the given voltages, and ends with [`advance`](Engine::advance); between the two the state before the step can be
+//! observed. The loop over steps lives in [`experiment::run`](crate::experiment::run).
+
+mod bullet;
+
+pub use bullet::BulletEngine;
+
+use thiserror::Error;
+
+use crate::bullet::BulletError;
+use crate::model::ModelError;
+
+/// A simulation that went wrong.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum EngineError {
+    /// The robot cannot be built.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Bullet refused a call.
+    #[error(transparent)]
+    Bullet(#[from] BulletError),
+    /// A coordinate is no longer a number.
+    #[error("the simulation diverged: {what} is {value} at step {step}, t = {time} s; try a time step below {stable_step:.3e} s")]
+    NotFinite {
+        /// The coordinate: a joint with its number, or the base.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// The step, counting from 0.
+        step: u64,
+        /// The time of the step (s).
+        time: f64,
+        /// The largest step for which the explicit torque law is stable (s).
+        stable_step: f64,
+    },
+}
+
+/// The joints at the start of a step.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JointState {
+    /// Angles (rad).
+    pub angles: Vec<f64>,
+    /// Rates (rad/s).
+    pub rates: Vec<f64>,
+    /// Torques of the coming step (dyn·cm).
+    pub torques: Vec<f64>,
+    /// Voltage on each joint: the actuator's, divided by m (V).
+    pub motor_voltages: Vec<f64>,
+}
+
+/// How often Bullet's limit on velocities was reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClampHits {
+    /// Steps after which a velocity stood at the limit.
+    pub steps: u64,
+    /// The first of them, counting from 0.
+    pub first_step: u64,
+    /// The limit (cm/s or rad/s).
+    pub limit: f64,
+}
+
+/// A robot that can be stepped.
+pub trait Engine {
+    /// Reads the joints and computes their torques for the given voltages (V), one per actuator.
+    ///
+    /// # Errors
+    /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number.
+    fn prepare(&mut self, voltages: &[f64]) -> Result<&JointState, EngineError>;
+
+    /// Positions (cm) and velocities (cm/s) of the nodes, N·m + 2 times x, y, z: the left end, each joint, the right end.
+    ///
+    /// # Errors
+    /// [`EngineError::NotFinite`] if the base's position is not a number.
+    fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError>;
+
+    /// Applies the torques and steps by the engine's time step.
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn advance(&mut self) -> Result<(), EngineError>;
+
+    /// Number of steps taken.
+    fn step(&self) -> u64;
+
+    /// Whether, when and how often the engine limited a velocity.
+    fn clamp_hits(&self) -> Option<ClampHits>;
+}

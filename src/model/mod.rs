@@ -1,0 +1,50 @@
+//! The physical model: layers become a beam, the beam becomes a chain of motor-link units.
+//!
+//! Frame, used everywhere: the chain lies along +x from its left end, z points up, joints turn about +y. A positive joint angle
+//! lowers the far end (a right-handed turn about +y takes +x towards −z); a negative voltage gives a positive rest angle, so it
+//! bends the free end of a clamped robot down.
+//!
+//! Two sets of constants were published, and neither matches both published measurements:
+//!
+//! | | [`Material::PARAMETER_2`] | [`Material::PARAMETER_4`] | published |
+//! | --- | --- | --- | --- |
+//! | first frequency of the cantilever (Euler-Bernoulli) | 18.1 Hz | 24.0 Hz | 23 Hz measured, 25 Hz simulated |
+//! | static tip at −1000 V, m = 3 | −19.0 mm | −23.4 mm | −20 mm |
+
+mod laminate;
+mod robot;
+pub mod units;
+
+pub use laminate::{Laminate, Material};
+pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, Robot, Segment};
+
+use thiserror::Error;
+
+/// A robot that cannot be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A constant out of range.
+    #[error("{key} is {value} (in the program's CGS units), but must be {needed}")]
+    Value {
+        /// Key of the experiment file.
+        key: &'static str,
+        /// Its value, in CGS units.
+        value: f64,
+        /// The range that is accepted.
+        needed: &'static str,
+    },
+}
+
+impl ModelError {
+    fn unless(holds: bool, key: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(Self::Value { key, value, needed }) }
+    }
+
+    /// The key of the experiment file at fault.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::Value { key, .. } => key,
+        }
+    }
+}

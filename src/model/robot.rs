@@ -1,0 +1,278 @@
+//! From a laminate to a chain of motor-link units.
+
+use super::{Laminate, Material, ModelError};
+use crate::actuator::PiezoJoint;
+
+/// How the robot is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mount {
+    /// Lying on a floor.
+    Ground,
+    /// Left end held in the world, no floor.
+    Clamped,
+    /// Neither held nor supported.
+    Free,
+}
+
+/// Where films of high friction are glued under the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Film {
+    /// Under both ends.
+    BothEnds,
+    /// Under the right end.
+    RightEnd,
+    /// Nowhere.
+    None,
+}
+
+/// Friction coefficients. Bullet multiplies the floor's with the link's and limits the product to 10.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    /// Of the floor (–).
+    pub ground: f64,
+    /// Of the bare robot (–).
+    pub low: f64,
+    /// Of the films (–).
+    pub high: f64,
+    /// Where the films are.
+    pub film: Film,
+    /// Length of a film as a share of one actuator (–).
+    pub film_fraction: f64,
+}
+
+/// How much the joints are damped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Damping {
+    /// The reference's `dampingEta` D (–): η = D / (2π · 1 Hz).
+    Eta(f64),
+    /// η of eq. 1 (s).
+    Time(f64),
+}
+
+impl Damping {
+    /// η of eq. 1 (s).
+    pub fn time(self) -> f64 {
+        match self {
+            Self::Eta(eta) => eta / (2.0 * std::f64::consts::PI * 1.0),
+            Self::Time(time) => time,
+        }
+    }
+
+    /// The reference's `dampingEta` (–).
+    pub fn eta(self) -> f64 {
+        match self {
+            Self::Eta(eta) => eta,
+            Self::Time(time) => time * (2.0 * std::f64::consts::PI * 1.0),
+        }
+    }
+}
+
+/// A robot: `actuators` laminates in a row, each made of `motors_per_actuator` motor-link units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robot {
+    /// The laminate of every actuator.
+    pub material: Material,
+    /// Number of actuators, N.
+    pub actuators: usize,
+    /// Motor-link units per actuator, m.
+    pub motors_per_actuator: usize,
+    /// How it is held.
+    pub mount: Mount,
+    /// Damping of the joints.
+    pub damping: Damping,
+    /// Thickness of the collision boxes (cm). It sets contact and inertia; the laminate itself is thinner.
+    pub collision_thickness: f64,
+    /// Factor on positive voltages before the torque law (–).
+    pub positive_gain: f64,
+    /// Friction coefficients and films.
+    pub friction: Friction,
+}
+
+/// One body of the chain: a box of `length` × width × thickness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// Along x (cm).
+    pub length: f64,
+    /// Mass (g).
+    pub mass: f64,
+    /// Friction coefficient of its underside (–).
+    pub friction: f64,
+}
+
+/// Largest number of joints that an experiment may ask for.
+pub const MAX_JOINTS: usize = 10_000;
+
+impl Robot {
+    /// Number of joints, N·m.
+    pub fn joints(&self) -> usize {
+        self.actuators * self.motors_per_actuator
+    }
+
+    /// Length of a whole link, L/m (cm).
+    pub fn link_length(&self) -> f64 {
+        self.material.actuator_length / self.motors_per_actuator as f64
+    }
+
+    /// Half a link, l = L/(2m) (cm): the length of the first and last body, and of eq. 3.
+    pub fn half_link_length(&self) -> f64 {
+        0.5 * self.link_length()
+    }
+
+    /// The torque law shared by all joints.
+    ///
+    /// ```text
+    /// k = w·(EI/2)/l      θ_V = −β·(V/m)
+    /// ```
+    pub fn joint(&self) -> PiezoJoint {
+        let laminate = Laminate::new(&self.material);
+        PiezoJoint {
+            stiffness: self.material.width * (laminate.flexural_rigidity / 2.0 / self.half_link_length()),
+            rest_angle_per_volt: -laminate.rotation_per_volt,
+            damping_time: self.damping.time(),
+        }
+    }
+
+    /// The N·m + 1 bodies from left to right. The first and last are half as long and heavy as the others, so that the joints
+    /// stand at the middle of the pieces they represent.
+    pub fn segments(&self) -> Vec<Segment> {
+        let m = self.motors_per_actuator as f64;
+        let mass = Laminate::new(&self.material).actuator_mass;
+        let count = self.joints() + 1;
+        let film = self.film_segments();
+        let Friction { low, high, film: place, .. } = self.friction;
+        (0..count)
+            .map(|i| {
+                let end = i == 0 || i + 1 == count;
+                let on_film = match place {
+                    Film::BothEnds => i < film || i + film >= count,
+                    Film::RightEnd => i + film >= count,
+                    Film::None => false,
+                };
+                Segment {
+                    length: if end { self.half_link_length() } else { self.link_length() },
+                    mass: if end { mass / (2.0 * m) } else { mass / m },
+                    friction: if on_film { high } else { low },
+                }
+            })
+            .collect()
+    }
+
+    /// Number of bodies that one film covers: `ceil(m·fraction + 0.5)`, as the reference counts.
+    fn film_segments(&self) -> usize {
+        (self.motors_per_actuator as f64 * self.friction.film_fraction + 0.5).ceil() as usize
+    }
+
+    /// Checks that the robot can be built.
+    ///
+    /// # Errors
+    /// [`ModelError`] names the key of the experiment file at fault.
+    pub fn check(&self) -> Result<(), ModelError> {
+        self.material.check()?;
+        for (key, value) in
+            [("robot.actuators", self.actuators), ("robot.motors_per_actuator", self.motors_per_actuator)]
+        {
+            ModelError::unless((1..=MAX_JOINTS).contains(&value), key, value as f64, "between 1 and 10000")?;
+        }
+        ModelError::unless(
+            self.joints() <= MAX_JOINTS,
+            "robot.motors_per_actuator",
+            self.motors_per_actuator as f64,
+            "such that the robot has at most 10000 joints",
+        )?;
+        let (damping_key, damping) = match self.damping {
+            Damping::Eta(eta) => ("robot.damping_eta", eta),
+            Damping::Time(time) => ("robot.damping_time_s", time),
+        };
+        for (key, value) in [
+            (damping_key, damping),
+            ("robot.friction.ground", self.friction.ground),
+            ("robot.friction.low", self.friction.low),
+            ("robot.friction.high", self.friction.high),
+        ] {
+            ModelError::unless(value.is_finite() && value >= 0.0, key, value, "zero or more")?;
+        }
+        for (key, value) in
+            [("robot.collision_thickness_mm", self.collision_thickness), ("robot.positive_gain", self.positive_gain)]
+        {
+            ModelError::unless(value.is_finite() && value > 0.0, key, value, "positive")?;
+        }
+        let fraction = self.friction.film_fraction;
+        ModelError::unless(
+            fraction.is_finite() && fraction >= 0.0,
+            "robot.friction.film_fraction",
+            fraction,
+            "zero or more",
+        )?;
+        let films = match self.friction.film {
+            Film::BothEnds => 2 * self.film_segments(),
+            Film::RightEnd => self.film_segments(),
+            Film::None => 0,
+        };
+        // The reference lets two films overlap on a very short robot and then breaks on its list of frictions.
+        ModelError::unless(
+            self.mount != Mount::Ground || films <= self.joints() + 1,
+            "robot.friction.film_fraction",
+            fraction,
+            "such that the films fit under the robot",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(crate) fn robot(actuators: usize, motors: usize, film: Film) -> Robot {
+        Robot {
+            material: Material::PARAMETER_2,
+            actuators,
+            motors_per_actuator: motors,
+            mount: Mount::Ground,
+            damping: Damping::Eta(0.045),
+            collision_thickness: 0.1,
+            positive_gain: 1.0,
+            friction: Friction { ground: 1.0, low: 0.2, high: 4.0, film, film_fraction: 0.5 },
+        }
+    }
+
+    #[test]
+    fn segments_carry_the_whole_length_and_mass() {
+        let robot = robot(5, 3, Film::BothEnds);
+        let segments = robot.segments();
+        assert_eq!(segments.len(), 16);
+        let laminate = Laminate::new(&robot.material);
+        // Sums of 16 rounded terms: a few units in the last place.
+        assert!((segments.iter().map(|s| s.length).sum::<f64>() - 50.0).abs() < 1e-13);
+        assert!((segments.iter().map(|s| s.mass).sum::<f64>() / laminate.actuator_mass - 5.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn films_cover_as_many_segments_as_in_the_reference() {
+        let high = |robot: Robot| robot.segments().iter().map(|s| s.friction == 4.0).collect::<Vec<_>>();
+        // m = 1, fraction 0.5: ceil(1.0) = 1; m = 3: ceil(2.0) = 2; m = 4: ceil(2.5) = 3.
+        assert_eq!(high(robot(2, 1, Film::BothEnds)), [true, false, true]);
+        assert_eq!(high(robot(1, 4, Film::RightEnd)), [false, false, true, true, true]);
+        assert_eq!(high(robot(5, 3, Film::BothEnds)).iter().filter(|&&h| h).count(), 4);
+        assert_eq!(high(robot(2, 1, Film::None)), [false; 3]);
+    }
+
+    #[test]
+    fn damping_keys_convert_into_each_other() {
+        let eta = Damping::Eta(0.045);
+        assert_eq!(eta.time(), 0.045 / (2.0 * std::f64::consts::PI));
+        assert!((Damping::Time(eta.time()).eta() - 0.045).abs() < 1e-17);
+    }
+
+    #[test]
+    fn robots_that_cannot_be_built_are_refused() {
+        for broken in [
+            Robot { actuators: 0, ..robot(5, 3, Film::None) },
+            Robot { motors_per_actuator: 0, ..robot(5, 3, Film::None) },
+            Robot { damping: Damping::Eta(-1.0), ..robot(5, 3, Film::None) },
+            Robot { positive_gain: f64::INFINITY, ..robot(5, 3, Film::None) },
+            Robot { actuators: 1, motors_per_actuator: 2, ..robot(5, 3, Film::BothEnds) },
+        ] {
+            assert!(broken.check().is_err(), "{broken:?}");
+        }
+    }
+}
