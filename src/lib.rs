@@ -3,6 +3,9 @@
 pub mod actuator;
 pub mod analytic;
 pub mod bullet;
+pub mod crosscheck;
 pub mod drive;
 pub mod engine;
+pub mod experiment;
 pub mod model;
+pub mod recording;

@@ -113,17 +113,21 @@ int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *li
     const btVector3 origin = bs::vector(base_position);
     add_collider(*world, body, -1, *body.shapes[0], origin, false);
 
-    // Centre of mass of every body so far, in the zero configuration: all frames are parallel to the world's.
-    std::vector<btVector3> centres{origin};
+    // Where every body's frame stands so far, in the zero configuration: the base's centre of mass, then the joints. Summed from
+    // frame to frame, as PyBullet does: by way of the centres of mass the last bit differs, and with it which neighbours' boxes
+    // touch at the start, the order of the pairs in the broadphase, and in the end the order of contacts.
+    std::vector<btVector3> frames{origin};
+    std::vector<btVector3> to_centre{btVector3(0, 0, 0)};
     for (int32_t i = 0; i < link_count; ++i) {
       const bs_link &link = links[i];
       body.shapes.push_back(box(link.half_extents, link.collision_margin));
       btCollisionShape &shape = *body.shapes.back();
       multibody.setupRevolute(i, link.mass, inertia_of(shape, link.mass), link.parent, btQuaternion(0, 0, 0, 1), bs::vector(link.axis),
                               bs::vector(link.parent_com_to_joint), bs::vector(link.joint_to_com), true);
-      const btVector3 joint = centres[static_cast<size_t>(link.parent + 1)] + bs::vector(link.parent_com_to_joint);
-      centres.push_back(joint + bs::vector(link.joint_to_com));
-      add_collider(*world, body, i, shape, joint, false);
+      const size_t parent = static_cast<size_t>(link.parent + 1);
+      frames.push_back(frames[parent] + (to_centre[parent] + bs::vector(link.parent_com_to_joint)));
+      to_centre.push_back(bs::vector(link.joint_to_com));
+      add_collider(*world, body, i, shape, frames.back(), false);
     }
     finish(*world, body, origin);
     // Frictions after everything else, base first, as the reference sets them.

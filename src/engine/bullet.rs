@@ -155,7 +155,7 @@ fn pitch(x: f64, z: f64) -> f64 {
 }
 
 impl Engine for BulletEngine {
-    fn prepare(&mut self, voltages: &[f64]) -> Result<&JointState, EngineError> {
+    fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
         let JointState { angles, rates, torques, motor_voltages } = &mut self.state;
         self.world.joint_states(self.body, angles, rates)?;
         let m = self.motors_per_actuator as f64;
@@ -170,7 +170,11 @@ impl Engine for BulletEngine {
                 sum += 0.0 * angles[i] + 0.0 * rates[i];
             }
         }
-        if sum != 0.0 { Err(self.find_not_finite()) } else { Ok(&self.state) }
+        if sum == 0.0 { Ok(()) } else { Err(self.find_not_finite()) }
+    }
+
+    fn joints(&self) -> &JointState {
+        &self.state
     }
 
     /// The base's pose is current; the joints' positions, and the right end that hangs on the last of them, come from transforms

@@ -69,7 +69,10 @@ pub trait Engine {
     ///
     /// # Errors
     /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number.
-    fn prepare(&mut self, voltages: &[f64]) -> Result<&JointState, EngineError>;
+    fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError>;
+
+    /// The joints as the last [`prepare`](Self::prepare) found them.
+    fn joints(&self) -> &JointState;
 
     /// Positions (cm) and velocities (cm/s) of the nodes, N·m + 2 times x, y, z: the left end, each joint, the right end.
     ///

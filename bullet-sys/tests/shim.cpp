@@ -1,0 +1,463 @@
+// Exercises the shim's whole C interface without Rust, so that it can run under the sanitizers (scripts/sanitize.sh).
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "../shim/bullet_shim.h"
+
+namespace {
+
+std::atomic<int> passed{0}, failed{0};
+
+#define CHECK(condition)                                                              \
+  do {                                                                                \
+    if (condition) {                                                                  \
+      ++passed;                                                                       \
+    } else {                                                                          \
+      ++failed;                                                                       \
+      std::printf("%s:%d: CHECK failed: %s\n", __FILE__, __LINE__, #condition);       \
+    }                                                                                 \
+  } while (false)
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+constexpr double STEP = 1e-3;
+constexpr int LINKS = 7;
+using Numbers = std::vector<double>;
+
+bool same_bits(const Numbers &a, const Numbers &b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+
+bs_settings settings() {
+  bs_settings s{};
+  s.gravity[2] = -980;
+  s.erp2 = 0.08;
+  s.friction_erp = 0.2;
+  s.linear_slop = 1e-5;
+  s.warmstarting_factor = 0.1;
+  s.least_squares_residual_threshold = 1e-7;
+  s.solver_iterations = 50;
+  return s;
+}
+
+bs_link box(double mass, double x, double y, double z, int parent) {
+  bs_link link{};
+  link.mass = mass;
+  link.half_extents[0] = x;
+  link.half_extents[1] = y;
+  link.half_extents[2] = z;
+  link.axis[1] = 1;
+  link.friction = 0.6;
+  link.collision_margin = 0.01;
+  link.parent = parent;
+  return link;
+}
+
+// Boxes in a row on alternating hinges.
+std::vector<bs_link> chain_links() {
+  std::vector<bs_link> links;
+  for (int i = 0; i < LINKS; ++i) {
+    bs_link link = box(2 + 0.25 * i, 1, 0.8, 0.3, i - 1);
+    link.parent_com_to_joint[0] = link.joint_to_com[0] = 1.1;
+    if (i % 3 == 2) link.axis[0] = 0.6, link.axis[1] = 0.8;
+    links.push_back(link);
+  }
+  return links;
+}
+
+struct World {
+  bs_world *handle = nullptr;
+  int32_t ground = -1, chain = -1, crate = -1, hanging = -1;
+  explicit World(const bs_settings &s) { CHECK(bs_world_create(&s, &handle, nullptr, 0) == BS_OK); }
+  ~World() { bs_world_destroy(handle); }
+  World(const World &) = delete;
+  World &operator=(const World &) = delete;
+};
+
+// Ground, a chain that jumps about, a crate that it pushes, and a body that is tied to the world above them.
+void fill(World &world, bool with_ground_first = true, double crate_mass = 5, double half_width = 500) {
+  const double extents[3] = {half_width, half_width, 10}, chain_at[3] = {0, 0, 0.6}, crate_at[3] = {6, 0.4, 2.2}, hanging_at[3] = {0, 8, 6};
+  if (with_ground_first) CHECK(bs_ground_add(world.handle, extents, 0, 0.9, 0.01, &world.ground, nullptr, 0) == BS_OK);
+  const bs_link base = box(3, 1, 0.8, 0.3, -1), crate = box(crate_mass, 0.7, 0.7, 0.7, -1);
+  const auto links = chain_links();
+  CHECK(bs_multibody_add(world.handle, &base, links.data(), LINKS, chain_at, &world.chain, nullptr, 0) == BS_OK);
+  CHECK(bs_multibody_add(world.handle, &crate, nullptr, 0, crate_at, &world.crate, nullptr, 0) == BS_OK);
+  CHECK(bs_multibody_add(world.handle, &base, links.data(), 2, hanging_at, &world.hanging, nullptr, 0) == BS_OK);
+  CHECK(bs_fixed_constraint_add(world.handle, world.hanging, 1e6, nullptr, 0) == BS_OK);
+  if (!with_ground_first) CHECK(bs_ground_add(world.handle, extents, 0, 0.9, 0.01, &world.ground, nullptr, 0) == BS_OK);
+}
+
+// Torques of a step: strokes that throw the chain off the ground and let it fall, on top of springs towards a moving pose.
+void drive(World &world, int step, double scale = 1) {
+  double angles[LINKS], rates[LINKS], torques[LINKS];
+  CHECK(bs_joint_states(world.handle, world.chain, angles, rates, LINKS) == BS_OK);
+  for (int i = 0; i < LINKS; ++i) {
+    const double pose = 0.5 * std::sin(0.021 * step + 1.3 * i);
+    torques[i] = scale * (2e4 * (pose - angles[i]) - 150 * rates[i] + (step % 400 < 40 ? (i % 2 == 0 ? 2e4 : -2e4) : 0));
+  }
+  CHECK(bs_joint_torques_set(world.handle, world.chain, torques, LINKS) == BS_OK);
+}
+
+// All that the interface tells about the world.
+void observe(World &world, Numbers &out) {
+  for (int32_t body : {world.chain, world.crate, world.hanging, world.ground}) {
+    const int32_t links = body == world.chain ? LINKS : body == world.hanging ? 2 : 0;
+    const size_t n = static_cast<size_t>(links);
+    Numbers state(13 + 2 * n + 18 * n + 2);
+    double *at = state.data();
+    CHECK(bs_base_state(world.handle, body, at, 13) == BS_OK);
+    CHECK(bs_joint_states(world.handle, body, at + 13, at + 13 + n, links) == BS_OK);
+    CHECK(bs_link_states(world.handle, body, at + 13 + 2 * n, 15 * links) == BS_OK);
+    CHECK(bs_link_angular_velocities(world.handle, body, at + 13 + 17 * n, 3 * links) == BS_OK);
+    CHECK(bs_velocity_clamp(world.handle, body, at + 13 + 20 * n, at + 14 + 20 * n) == BS_OK);
+    out.insert(out.end(), state.begin(), state.end());
+  }
+  int32_t count = 0;
+  CHECK(bs_contacts(world.handle, nullptr, 0, &count) == BS_OK);
+  std::vector<bs_contact> contacts(static_cast<size_t>(count));
+  CHECK(bs_contacts(world.handle, contacts.data(), count, &count) == BS_OK);
+  out.push_back(count);
+  for (const bs_contact &c : contacts) {
+    for (const double *v : {c.position_on_b, c.normal_on_b, c.friction_direction_1, c.friction_direction_2}) {
+      out.insert(out.end(), v, v + 3);
+    }
+    for (double r : {c.distance, c.normal_impulse, c.friction_impulse[0], c.friction_impulse[1]}) out.push_back(r);
+    for (int32_t i : {c.body_a, c.link_a, c.body_b, c.link_b}) out.push_back(i);
+  }
+}
+
+Numbers run(World &world, int from, int steps, double scale = 1) {
+  Numbers out;
+  for (int step = from; step < from + steps; ++step) {
+    drive(world, step, scale);
+    CHECK(bs_world_step(world.handle, STEP, nullptr, 0) == BS_OK);
+    observe(world, out);
+  }
+  return out;
+}
+
+Numbers take(const World &world) {
+  int32_t size = 0;
+  CHECK(bs_snapshot_size(world.handle, &size) == BS_OK && size > 0);
+  Numbers data(static_cast<size_t>(size));
+  CHECK(bs_snapshot_take(world.handle, data.data(), size, nullptr, 0) == BS_OK);
+  return data;
+}
+
+int32_t restore(World &world, const Numbers &data, std::string *message = nullptr) {
+  char error[128] = "";
+  const int32_t code = bs_snapshot_restore(world.handle, data.data(), static_cast<int32_t>(data.size()), error, sizeof error);
+  if (message != nullptr) *message = error;
+  return code;
+}
+
+int32_t contact_count(const World &world) {
+  int32_t count = 0;
+  CHECK(bs_contacts(world.handle, nullptr, 0, &count) == BS_OK);
+  return count;
+}
+
+void identity() {
+  CHECK(bs_abi_version() == BS_ABI_VERSION);
+  CHECK(bs_scalar_size() == 8);
+  CHECK(bs_linked_scalar_size() == 8);
+  CHECK(bs_bullet_version() == 324);
+  int32_t sizes[6] = {-1, -1, -1, -1, -1, -1};
+  bs_layout(sizes, 3);
+  CHECK(sizes[2] == int32_t(sizeof(bs_contact)) && sizes[3] == -1);
+  bs_layout(sizes, 6);
+  CHECK(sizes[0] == int32_t(sizeof(bs_settings)) && sizes[1] == int32_t(sizeof(bs_link)));
+  CHECK(sizes[5] == int32_t(offsetof(bs_contact, link_b)));
+}
+
+void misuse() {
+  bs_settings s = settings();
+  bs_world *none = nullptr;
+  char error[8];
+  CHECK(bs_world_create(nullptr, &none, error, sizeof error) == BS_ERROR_ARGUMENT && std::strlen(error) == 7);
+  CHECK(bs_world_create(&s, nullptr, nullptr, 0) == BS_ERROR_ARGUMENT);
+  s.solver_iterations = 0;
+  CHECK(bs_world_create(&s, &none, error, 0) == BS_ERROR_ARGUMENT && none == nullptr);
+  bs_world_destroy(nullptr);
+  s.solver_iterations = 50;
+  World world(s);
+  bs_world *w = world.handle;
+  const double at[3] = {0, 0, 5}, extents[3] = {10, 10, 1}, flat[3] = {10, 0, 1};
+  bs_link base = box(1, 1, 1, 1, -1);
+  std::vector<bs_link> links = chain_links();
+  int32_t body = -7, size = 0;
+  auto add = [&](bs_world *in, const bs_link *b, const bs_link *l, int32_t n, const double *p, int32_t *out) {
+    return bs_multibody_add(in, b, l, n, p, out, nullptr, 0);
+  };
+  CHECK(add(nullptr, &base, nullptr, 0, at, &body) == BS_ERROR_ARGUMENT);
+  CHECK(add(w, nullptr, nullptr, 0, at, &body) == BS_ERROR_ARGUMENT);
+  CHECK(add(w, &base, nullptr, 1, at, &body) == BS_ERROR_ARGUMENT);
+  CHECK(add(w, &base, links.data(), -1, at, &body) == BS_ERROR_ARGUMENT);
+  CHECK(add(w, &base, nullptr, 0, nullptr, &body) == BS_ERROR_ARGUMENT);
+  CHECK(add(w, &base, nullptr, 0, at, nullptr) == BS_ERROR_ARGUMENT);
+  auto refused = [&](auto spoil) {
+    std::vector<bs_link> spoiled = links;
+    spoil(spoiled[3]);
+    return add(w, &base, spoiled.data(), LINKS, at, &body) == BS_ERROR_ARGUMENT;
+  };
+  CHECK(refused([](bs_link &l) { l.parent = 3; }));
+  CHECK(refused([](bs_link &l) { l.parent = -2; }));
+  CHECK(refused([](bs_link &l) { l.axis[1] = 2; }));
+  CHECK(refused([](bs_link &l) { l.axis[0] = NOT_A_NUMBER; }));
+  CHECK(refused([](bs_link &l) { l.mass = 0; }));
+  CHECK(refused([](bs_link &l) { l.mass = NOT_A_NUMBER; }));
+  CHECK(refused([](bs_link &l) { l.collision_margin = 0; }));
+  CHECK(refused([](bs_link &l) { l.friction = -1; }));
+  CHECK(refused([](bs_link &l) { l.half_extents[1] = 0; }));  // noticed when half the body is in the world
+  CHECK(bs_ground_add(nullptr, extents, 0, 1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, nullptr, 0, 1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, flat, 0, 1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, extents, 0, -1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, extents, 0, 1, 0, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, extents, 0, 1, 0.1, nullptr, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(body == -7);
+  CHECK(bs_world_step(w, STEP, nullptr, 0) == BS_OK);  // an empty world, after all the refusals
+  CHECK(restore(world, take(world)) == BS_OK);
+
+  fill(world);
+  CHECK(world.ground == 0 && world.chain == 1 && world.crate == 2 && world.hanging == 3);
+  CHECK(bs_fixed_constraint_add(nullptr, 0, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_fixed_constraint_add(w, 4, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_fixed_constraint_add(w, 1, 0, nullptr, 0) == BS_ERROR_ARGUMENT);
+  for (double step : {0.0, -STEP, NOT_A_NUMBER}) CHECK(bs_world_step(w, step, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_world_step(nullptr, STEP, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_world_set_gravity(w, nullptr) == BS_ERROR_ARGUMENT && bs_world_set_gravity(nullptr, at) == BS_ERROR_ARGUMENT);
+  Numbers a(200, 0.0), b(200, 0.0);
+  for (int32_t index : {-1, 4, std::numeric_limits<int32_t>::max(), std::numeric_limits<int32_t>::min()}) {
+    CHECK(bs_joint_states(w, index, a.data(), b.data(), LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_joint_states_set(w, index, a.data(), b.data(), LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_joint_torques_set(w, index, a.data(), LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_base_state(w, index, a.data(), 13) == BS_ERROR_ARGUMENT);
+    CHECK(bs_base_state_set(w, index, a.data(), 13) == BS_ERROR_ARGUMENT);
+    CHECK(bs_link_states(w, index, a.data(), 15 * LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_link_angular_velocities(w, index, a.data(), 3 * LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_velocity_clamp(w, index, a.data(), b.data()) == BS_ERROR_ARGUMENT);
+  }
+  for (int32_t off : {-1, 1}) {
+    CHECK(bs_joint_states(w, 1, a.data(), b.data(), LINKS + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_joint_states_set(w, 1, a.data(), b.data(), LINKS + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_joint_torques_set(w, 1, a.data(), LINKS + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_base_state(w, 1, a.data(), 13 + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_base_state_set(w, 1, a.data(), 13 + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_link_states(w, 1, a.data(), 15 * LINKS + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_link_angular_velocities(w, 1, a.data(), 3 * LINKS + off) == BS_ERROR_ARGUMENT);
+  }
+  CHECK(bs_joint_states(w, 1, nullptr, b.data(), LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_joint_states(w, 1, a.data(), nullptr, LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_joint_states_set(w, 1, nullptr, b.data(), LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_joint_torques_set(w, 1, nullptr, LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_base_state(w, 1, nullptr, 13) == BS_ERROR_ARGUMENT && bs_base_state(nullptr, 1, a.data(), 13) == BS_ERROR_ARGUMENT);
+  CHECK(bs_base_state_set(w, 1, nullptr, 13) == BS_ERROR_ARGUMENT);
+  CHECK(bs_base_state_set(w, 1, a.data(), 13) == BS_ERROR_ARGUMENT);  // a quaternion of zeros
+  CHECK(bs_link_states(w, 1, nullptr, 15 * LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_link_states(nullptr, 1, a.data(), 15 * LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_link_angular_velocities(w, 1, nullptr, 3 * LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_velocity_clamp(w, 1, nullptr, a.data()) == BS_ERROR_ARGUMENT);
+  CHECK(bs_velocity_clamp(w, 1, a.data(), nullptr) == BS_ERROR_ARGUMENT);
+  CHECK(bs_contacts(nullptr, nullptr, 0, &size) == BS_ERROR_ARGUMENT && bs_contacts(w, nullptr, 0, nullptr) == BS_ERROR_ARGUMENT);
+  CHECK(bs_contacts(w, nullptr, 1, &size) == BS_ERROR_ARGUMENT && bs_contacts(w, nullptr, -1, &size) == BS_OK);
+  CHECK(bs_snapshot_size(nullptr, &size) == BS_ERROR_ARGUMENT && bs_snapshot_size(w, nullptr) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_size(w, &size) == BS_OK);
+  a.assign(static_cast<size_t>(size), 0);
+  CHECK(bs_snapshot_take(nullptr, a.data(), size, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_take(w, nullptr, size, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_take(w, a.data(), size - 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_take(w, a.data(), -1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_take(w, a.data(), size, nullptr, 0) == BS_OK);
+  CHECK(bs_snapshot_restore(nullptr, a.data(), size, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_restore(w, nullptr, size, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_snapshot_restore(w, a.data(), -1, nullptr, 0) == BS_ERROR_ARGUMENT);
+}
+
+void reading_and_writing() {
+  World world(settings());
+  fill(world);
+  Numbers set(2 * LINKS), got(2 * LINKS), base = {1, 2, 30, 0, 0, 0.6, 0.8, 4, 5, 6, 0.1, 0.2, 0.3}, back(13);
+  for (size_t i = 0; i < set.size(); ++i) set[i] = 0.1 * double(i) - 0.3;
+  CHECK(bs_joint_states_set(world.handle, world.chain, set.data(), set.data() + LINKS, LINKS) == BS_OK);
+  CHECK(bs_joint_states(world.handle, world.chain, got.data(), got.data() + LINKS, LINKS) == BS_OK);
+  CHECK(same_bits(set, got));
+  CHECK(bs_base_state_set(world.handle, world.chain, base.data(), 13) == BS_OK);
+  CHECK(bs_base_state(world.handle, world.chain, back.data(), 13) == BS_OK);
+  for (size_t i = 0; i < 13; ++i) CHECK(back[i] == base[i]);
+  double limit = 0, largest = 0;
+  CHECK(bs_velocity_clamp(world.handle, world.chain, &limit, &largest) == BS_OK && limit == 100 && largest == 6);
+
+  // A crate in free fall, then one that gravity has let go.
+  const double nothing[3] = {0, 0, 0};
+  const double up[13] = {100, 100, 500, 0, 0, 0, 1};
+  CHECK(bs_base_state_set(world.handle, world.crate, up, 13) == BS_OK);
+  CHECK(bs_world_step(world.handle, STEP, nullptr, 0) == BS_OK);
+  CHECK(bs_base_state(world.handle, world.crate, back.data(), 13) == BS_OK);
+  CHECK(std::abs(back[9] + 0.98) < 1e-12 && std::abs(back[2] - (500 - 0.98e-3)) < 1e-9);
+  const double speed = back[9];
+  CHECK(bs_world_set_gravity(world.handle, nothing) == BS_OK);
+  CHECK(bs_world_step(world.handle, STEP, nullptr, 0) == BS_OK);
+  CHECK(bs_base_state(world.handle, world.crate, back.data(), 13) == BS_OK && back[9] == speed);
+}
+
+// A driven world in mid-jump, with some contacts left.
+constexpr int BEFORE = 650;
+int32_t step_into_flight(World &world) {
+  run(world, 0, BEFORE);
+  return contact_count(world);
+}
+
+void continuation(bool ground_first, double half_width, int steps) {
+  World world(settings());
+  fill(world, ground_first, 5, half_width);
+  const int32_t contacts = step_into_flight(world);
+  CHECK(contacts > 0);
+  drive(world, BEFORE, 0.5);  // torques that wait for the next step belong to the snapshot
+  const Numbers snapshot = take(world);
+  CHECK(same_bits(snapshot, take(world)));
+  auto go_on = [steps](World &in) {
+    Numbers out;
+    CHECK(bs_world_step(in.handle, STEP, nullptr, 0) == BS_OK);
+    observe(in, out);
+    const Numbers rest = run(in, BEFORE + 1, steps);
+    out.insert(out.end(), rest.begin(), rest.end());
+    return out;
+  };
+  const Numbers expected = go_on(world);
+  std::printf("ground %s, %g wide: %d contacts in the snapshot of %zu numbers, %zu numbers observed over %d steps\n",
+              ground_first ? "first" : "last", 2 * half_width, contacts, snapshot.size(), expected.size(), steps);
+
+  CHECK(restore(world, snapshot) == BS_OK);  // the same world, gone on
+  CHECK(same_bits(take(world), snapshot));
+  CHECK(contact_count(world) == contacts);
+  CHECK(same_bits(go_on(world), expected));
+  CHECK(restore(world, snapshot) == BS_OK && restore(world, snapshot) == BS_OK);  // twice over
+  CHECK(same_bits(go_on(world), expected));
+
+  World fresh(settings());
+  fill(fresh, ground_first, 5, half_width);
+  CHECK(restore(fresh, snapshot) == BS_OK);
+  CHECK(same_bits(take(fresh), snapshot));
+  CHECK(same_bits(go_on(fresh), expected));
+
+  World strayed(settings());
+  fill(strayed, ground_first, 5, half_width);
+  const double sideways[3] = {300, -200, 100};
+  run(strayed, 37, 500, -1.5);
+  CHECK(bs_world_set_gravity(strayed.handle, sideways) == BS_OK);
+  run(strayed, 900, 700, 3);
+  CHECK(restore(strayed, snapshot) == BS_OK);
+  CHECK(same_bits(take(strayed), snapshot));
+  CHECK(same_bits(go_on(strayed), expected));
+
+  // Back and forth, as an optimiser would: every few steps to the start again.
+  for (int round = 0; round < 10; ++round) {
+    CHECK(restore(strayed, snapshot) == BS_OK);
+    run(strayed, 100 * round, 7 * round, 1 + round);
+  }
+  CHECK(restore(strayed, snapshot) == BS_OK);
+  CHECK(same_bits(go_on(strayed), expected));
+}
+
+void foreign_snapshots() {
+  World world(settings());
+  fill(world);
+  CHECK(step_into_flight(world) > 0);
+  const Numbers snapshot = take(world);
+  std::string message;
+  auto refused = [&](const Numbers &data) { return restore(world, data, &message) == BS_ERROR_SNAPSHOT && !message.empty(); };
+  CHECK(bs_snapshot_restore(world.handle, snapshot.data(), 0, nullptr, 0) == BS_ERROR_SNAPSHOT);
+  for (size_t length = 1; length < snapshot.size(); ++length) {
+    // Exactly as long as it says, so that AddressSanitizer sees a read past the end.
+    CHECK(refused(Numbers(snapshot.begin(), snapshot.begin() + static_cast<std::ptrdiff_t>(length))));
+  }
+  Numbers longer = snapshot;
+  longer.push_back(0);
+  CHECK(refused(longer));
+  CHECK(same_bits(take(world), snapshot));
+
+  // Every number spoiled in turn. Some values are as good as others (an angle of 1e300 is only bad physics), but nothing may crash,
+  // what is refused must leave the world alone, and what is not finite must be refused.
+  World victim(settings());
+  fill(victim);
+  CHECK(restore(victim, snapshot) == BS_OK);
+  int taken = 0;
+  for (size_t i = 0; i < snapshot.size(); ++i) {
+    for (double value : {NOT_A_NUMBER, std::numeric_limits<double>::infinity(), 1e300, -1e10, -1.0, 0.5, 3.0, 4e9, 0.0}) {
+      Numbers spoiled = snapshot;
+      spoiled[i] = value;
+      const int32_t code = restore(victim, spoiled, &message);
+      const bool as_before = code == BS_OK || same_bits(take(victim), snapshot);
+      if (!((code == BS_OK && std::isfinite(value)) || code == BS_ERROR_SNAPSHOT) || !as_before) CHECK(!"a spoiled snapshot");
+      if (code == BS_OK) {
+        ++taken;
+        if (restore(victim, snapshot) != BS_OK) CHECK(!"a restore after a spoiled one");
+      }
+    }
+  }
+  std::printf("%zu numbers spoiled in 9 ways: %d of %zu accepted\n", snapshot.size(), taken, 9 * snapshot.size());
+  CHECK(same_bits(take(victim), snapshot));
+  // Neighbours swapped: well-formed integers in the wrong places.
+  for (size_t i = 0; i + 1 < snapshot.size(); ++i) {
+    Numbers swapped = snapshot;
+    std::swap(swapped[i], swapped[i + 1]);
+    const int32_t code = restore(victim, swapped);
+    if (code != BS_OK && code != BS_ERROR_SNAPSHOT) CHECK(!"a snapshot with swapped numbers");
+    if (code == BS_ERROR_SNAPSHOT && i % 16 == 0) CHECK(restore(victim, snapshot) == BS_OK);
+  }
+  CHECK(restore(victim, snapshot) == BS_OK);
+  CHECK(same_bits(run(victim, BEFORE, 200), run(world, BEFORE, 200)));
+
+  World heavier(settings()), other_order(settings()), empty(settings());
+  fill(heavier, true, 5.5);
+  fill(other_order, false);
+  CHECK(bs_fixed_constraint_add(other_order.handle, 0, 1, nullptr, 0) == BS_OK);
+  for (World *other : {&heavier, &other_order, &empty}) {
+    const Numbers before = take(*other);
+    CHECK(restore(*other, snapshot) == BS_ERROR_SNAPSHOT);
+    CHECK(same_bits(take(*other), before));
+    CHECK(restore(world, before) == BS_ERROR_SNAPSHOT);
+  }
+}
+
+void threads() {
+  auto simulate = [](Numbers &out) {
+    World world(settings());
+    fill(world);
+    out = run(world, 0, 600);
+    const Numbers snapshot = take(world);
+    run(world, 0, 50);
+    if (restore(world, snapshot) != BS_OK) out.clear();
+    const Numbers rest = run(world, 600, 600);
+    out.insert(out.end(), rest.begin(), rest.end());
+  };
+  Numbers alone, together[4];
+  simulate(alone);
+  std::vector<std::thread> running;
+  for (Numbers &out : together) running.emplace_back(simulate, std::ref(out));
+  for (std::thread &thread : running) thread.join();
+  for (const Numbers &out : together) CHECK(same_bits(out, alone));
+}
+
+}  // namespace
+
+int main() {
+  identity();
+  misuse();
+  reading_and_writing();
+  continuation(true, 500, 3000);
+  continuation(false, 500, 1500);
+  continuation(true, 1e6, 1500);  // so wide that Bullet stops updating its box and moves it to the tree of fixed objects
+  foreign_snapshots();
+  threads();
+  std::printf("%d passed, %d failed\n", passed.load(), failed.load());
+  return failed == 0 ? 0 : 1;
+}

@@ -1,0 +1,338 @@
+//! Experiment files: TOML with units in the keys. Unknown keys are refused, with line and column.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+use toml::Table;
+use toml::de::{DeTable, DeValue};
+
+/// An experiment that cannot be run as it is written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{}: {reason}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// Not TOML, an unknown key, or a value of the wrong type; the message shows line, column and key.
+    #[error("{source_name}: {message}")]
+    Syntax {
+        /// The file or argument.
+        source_name: String,
+        /// What the parser found.
+        message: String,
+    },
+    /// A value that makes no experiment.
+    #[error("{place}: {key}: {message}")]
+    Value {
+        /// The file, with the line where the key stands, or the argument that set it.
+        place: String,
+        /// The key.
+        key: String,
+        /// What is wrong, and what to try.
+        message: String,
+    },
+    /// A file that the experiment refers to is damaged.
+    #[error("{}: {reason}", path.display())]
+    Data {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and in which line.
+        reason: String,
+    },
+}
+
+/// A key and what is wrong with its value, before the place in the file is known.
+#[derive(Debug)]
+pub(super) struct Fault {
+    pub key: String,
+    pub message: String,
+}
+
+impl Fault {
+    pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { key: key.into(), message: message.into() }
+    }
+}
+
+/// An experiment file as written, every key optional. See the crate's guide for what the keys mean.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Config {
+    pub material: MaterialConfig,
+    pub robot: RobotConfig,
+    pub drive: DriveConfig,
+    pub simulation: SimulationConfig,
+}
+
+/// `[material]`: a preset and what overrides it.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct MaterialConfig {
+    pub preset: Option<String>,
+    pub actuator_length_mm: Option<f64>,
+    pub width_mm: Option<f64>,
+    pub gravity_m_s2: Option<f64>,
+    pub piezo_modulus_gpa: Option<f64>,
+    pub piezo_poisson: Option<f64>,
+    pub piezo_thickness_um: Option<f64>,
+    pub piezo_density_g_cm3: Option<f64>,
+    pub d33_pm_per_v: Option<f64>,
+    pub electrode_pitch_mm: Option<f64>,
+    pub substrate_modulus_gpa: Option<f64>,
+    pub substrate_poisson: Option<f64>,
+    pub substrate_thickness_um: Option<f64>,
+    pub substrate_density_g_cm3: Option<f64>,
+    pub adhesive_modulus_gpa: Option<f64>,
+    pub adhesive_thickness_um: Option<f64>,
+    pub adhesive_density_g_cm3: Option<f64>,
+}
+
+/// `[robot]`.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct RobotConfig {
+    pub actuators: Option<usize>,
+    pub motors_per_actuator: Option<usize>,
+    pub mount: Option<String>,
+    pub damping_eta: Option<f64>,
+    pub damping_time_s: Option<f64>,
+    pub collision_thickness_mm: Option<f64>,
+    pub positive_gain: Option<f64>,
+    pub friction: FrictionConfig,
+}
+
+/// `[robot.friction]`.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct FrictionConfig {
+    pub ground: Option<f64>,
+    pub low: Option<f64>,
+    pub high: Option<f64>,
+    pub film: Option<String>,
+    pub film_fraction: Option<f64>,
+}
+
+/// `[drive]`: exactly one waveform with the keys that belong to it.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct DriveConfig {
+    pub waveform: Option<String>,
+    pub gait: Option<String>,
+    pub period_s: Option<f64>,
+    pub frequency_hz: Option<f64>,
+    pub delay_s: Option<f64>,
+    pub on_time_s: Option<f64>,
+    pub on_voltages_v: Option<Vec<f64>>,
+    pub voltages_v: Option<Vec<f64>>,
+    pub amplitude_v: Option<f64>,
+    pub amplitudes_v: Option<Vec<f64>>,
+    pub at_s: Option<f64>,
+    pub phases: Option<Vec<PhaseConfig>>,
+    pub file: Option<PathBuf>,
+}
+
+/// One phase of a sequence.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct PhaseConfig {
+    pub until: Option<f64>,
+    pub until_s: Option<f64>,
+    pub on: Option<String>,
+    pub voltages_v: Option<Vec<f64>>,
+}
+
+/// `[simulation]`.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct SimulationConfig {
+    pub engine: Option<String>,
+    pub time_step_s: Option<f64>,
+    pub steps: Option<u64>,
+    pub duration_s: Option<f64>,
+    pub record_every_steps: Option<u64>,
+    pub record_every_s: Option<f64>,
+}
+
+/// The text of an experiment with the settings that override it: where every value came from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Name for messages: the file, `-`, or a preset.
+    pub name: String,
+    /// Folder that relative paths start from.
+    pub folder: PathBuf,
+    text: String,
+    settings: Vec<(String, String)>,
+}
+
+impl Source {
+    /// An experiment from its text.
+    pub fn from_text(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { name: name.into(), folder: PathBuf::new(), text: text.into(), settings: Vec::new() }
+    }
+
+    /// An experiment from a file; its relative paths start from the file's folder.
+    ///
+    /// # Errors
+    /// [`ConfigError::Unreadable`] if the file cannot be read as UTF-8 text.
+    pub fn from_file(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| ConfigError::Unreadable { path: path.into(), reason: error.to_string() })?;
+        let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+        Ok(Self { folder, ..Self::from_text(path.display().to_string(), text) })
+    }
+
+    /// Adds a setting `KEY=VALUE`, with the value in TOML or as a bare word.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] if there is no `=` or no key.
+    pub fn set(&mut self, assignment: &str) -> Result<(), ConfigError> {
+        match assignment.split_once('=') {
+            Some((key, value)) if !key.trim().is_empty() => {
+                self.settings.push((key.trim().to_owned(), value.trim().to_owned()));
+                Ok(())
+            }
+            _ => Err(ConfigError::Syntax {
+                source_name: format!("--set {assignment}"),
+                message: "a setting is written KEY=VALUE, for example robot.damping_eta=0.03".into(),
+            }),
+        }
+    }
+
+    /// Parses the text, then applies the settings.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`].
+    pub fn parse(&self) -> Result<Config, ConfigError> {
+        let syntax = |source_name: String, message: String| ConfigError::Syntax { source_name, message: message.trim_end().into() };
+        let config: Config =
+            toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
+        if self.settings.is_empty() {
+            return Ok(config);
+        }
+        let mut table: Table =
+            toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
+        for (key, value) in &self.settings {
+            let name = || format!("--set {key}={value}");
+            // `v = VALUE` is TOML if VALUE is; a bare word is taken as a string.
+            let parsed = toml::from_str::<Table>(&format!("v = {value}"))
+                .ok()
+                .filter(|table| table.len() == 1)
+                .and_then(|mut table| table.remove("v"))
+                .unwrap_or_else(|| toml::Value::String(value.clone()));
+            assign(&mut table, key, parsed).map_err(|message| syntax(name(), message))?;
+            // Checked one by one, so that the message names the setting at fault.
+            table.clone().try_into::<Config>().map_err(|error| syntax(name(), error.to_string()))?;
+        }
+        table.try_into().map_err(|error: toml::de::Error| syntax(self.name.clone(), error.to_string()))
+    }
+
+    /// Says where a key's value came from.
+    pub(super) fn locate(&self, fault: Fault) -> ConfigError {
+        let Fault { key, message } = fault;
+        let set = self.settings.iter().rev().find(|(set, _)| *set == key);
+        let place = match (set, line_of(&self.text, &key)) {
+            (Some((key, value)), _) => format!("--set {key}={value}"),
+            (None, Some(line)) => format!("{}, line {line}", self.name),
+            (None, None) => self.name.clone(),
+        };
+        ConfigError::Value { place, key, message }
+    }
+}
+
+/// Sets a dotted key in a table, making tables on the way.
+fn assign(table: &mut Table, key: &str, value: toml::Value) -> Result<(), String> {
+    match key.split_once('.') {
+        None => {
+            table.insert(key.to_owned(), value);
+            Ok(())
+        }
+        Some((head, rest)) => match table.entry(head).or_insert_with(|| toml::Value::Table(Table::new())) {
+            toml::Value::Table(inner) => assign(inner, rest, value),
+            _ => Err(format!("{head} is not a table")),
+        },
+    }
+}
+
+/// Line (from 1) of the deepest part of a dotted key that the text contains.
+fn line_of(text: &str, key: &str) -> Option<usize> {
+    let parsed = DeTable::parse(text).ok()?;
+    let mut table = parsed.get_ref();
+    let mut found = None;
+    for part in key.split('.') {
+        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref().as_ref() == part) else { break };
+        found = Some(name.span().start);
+        match value.get_ref() {
+            DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    found.map(|offset| text[..offset].matches('\n').count() + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const TEXT: &str = "[robot]\nactuators = 5\n\n[robot.friction]\nlow = 0.2\n";
+
+    #[test]
+    fn an_unknown_key_and_a_wrong_type_are_shown_with_their_line() {
+        for (text, line, word) in
+            [("[robot]\nlegs = 4\n", "line 2", "legs"), ("\n[robot]\nactuators = \"x\"\n", "line 3", "actuators")]
+        {
+            let error = Source::from_text("a.toml", text).parse().unwrap_err().to_string();
+            assert!(error.contains("a.toml") && error.contains(line) && error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn settings_override_the_text_and_are_named_when_they_are_wrong() {
+        let mut source = Source::from_text("a.toml", TEXT);
+        source.set("robot.actuators=3").unwrap();
+        source.set("robot.mount = clamped").unwrap();
+        source.set("drive.voltages_v=[1, 2.5]").unwrap();
+        let config = source.parse().unwrap();
+        assert_eq!(config.robot.actuators, Some(3));
+        assert_eq!(config.robot.mount.as_deref(), Some("clamped"));
+        assert_eq!(config.drive.voltages_v, Some(vec![1.0, 2.5]));
+        source.set("robot.legs=4").unwrap();
+        let error = source.parse().unwrap_err().to_string();
+        assert!(error.contains("--set robot.legs=4"), "{error}");
+        assert!(source.set("nonsense").is_err());
+    }
+
+    #[test]
+    fn a_fault_is_placed_at_the_key_or_else_at_its_table() {
+        let source = Source::from_text("a.toml", TEXT);
+        let place = |key: &str| source.locate(Fault::new(key, "wrong")).to_string();
+        assert_eq!(place("robot.friction.low"), "a.toml, line 5: robot.friction.low: wrong");
+        assert_eq!(place("robot.actuators"), "a.toml, line 2: robot.actuators: wrong");
+        assert_eq!(place("robot.mount"), "a.toml, line 1: robot.mount: wrong");
+        assert_eq!(place("drive.waveform"), "a.toml: drive.waveform: wrong");
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_and_any_setting_is_a_config_or_an_error_but_never_a_panic(text in ".{0,200}", setting in ".{0,40}") {
+            let mut source = Source::from_text("fuzz", text);
+            let _ = source.parse();
+            if source.set(&setting).is_ok() {
+                let _ = source.parse();
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! An experiment: a robot, what drives it, and how long it is simulated.
+
+mod config;
+mod drive_csv;
+pub mod presets;
+mod resolve;
+mod run;
+mod spec;
+
+pub use config::{
+    Config, ConfigError, DriveConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
+};
+pub use resolve::experiment;
+pub use run::{Control, Run, run};
+
+use crate::drive::{Drive, Waveform};
+use crate::engine::{BulletEngine, EngineError};
+use crate::model::{Mount, Robot};
+use crate::recording::{GroundMeta, Meta};
+
+/// A checked experiment in CGS units.
+///
+/// # Examples
+/// ```
+/// use sfers::experiment::{self, Control, Source};
+/// let mut source = Source::from_text("preset", experiment::presets::find("cantilever-dc").unwrap().text);
+/// source.set("simulation.duration_s=0.001")?;
+/// let experiment = experiment::experiment(&source)?;
+/// let run = experiment::run(&experiment, &mut experiment.engine()?, |_| Control::Continue)?;
+/// assert_eq!(run.recording.joints(), 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// The robot.
+    pub robot: Robot,
+    /// What drives it.
+    pub drive: Drive,
+    /// Time step (s).
+    pub time_step: f64,
+    /// Number of steps.
+    pub steps: u64,
+    /// A record is taken every so many steps, and at the first and last.
+    pub record_every: u64,
+    /// The keys as they were given.
+    pub config: Config,
+}
+
+impl Experiment {
+    /// Builds the engine that the experiment asks for.
+    ///
+    /// # Errors
+    /// [`EngineError`] if the robot cannot be built.
+    pub fn engine(&self) -> Result<BulletEngine, EngineError> {
+        BulletEngine::new(&self.robot, self.time_step)
+    }
+
+    /// Whether the state before step `step` is recorded: `(step + 1)` a multiple of the interval, or the first or last step.
+    pub fn records(&self, step: u64) -> bool {
+        (step + 1).is_multiple_of(self.record_every) || step == 0 || step == self.steps - 1
+    }
+
+    /// The numbers that go with the recording of a run of `steps` steps, saved at `date_time`.
+    pub fn meta(&self, steps: u64, date_time: String) -> Meta {
+        let frequency = match &self.drive.waveform {
+            Waveform::Sine { frequency, .. } => *frequency,
+            _ => 1.0,
+        };
+        let period = match &self.drive.waveform {
+            Waveform::Gait { parameter, .. } => *parameter,
+            _ => self.drive.period().unwrap_or(0.0),
+        };
+        let friction = &self.robot.friction;
+        Meta {
+            time_step: self.time_step,
+            steps,
+            record_every: self.record_every,
+            actuators: self.robot.actuators,
+            motors_per_actuator: self.robot.motors_per_actuator,
+            actuator_length: self.robot.material.actuator_length,
+            driven_frequency: frequency,
+            damping_eta: self.robot.damping.eta(),
+            ground: (self.robot.mount == Mount::Ground).then_some(GroundMeta {
+                friction_low: friction.low,
+                friction_high: friction.high,
+                period,
+                date_time,
+            }),
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! The loop over steps.
+
+use super::Experiment;
+use crate::engine::{ClampHits, Engine, EngineError};
+use crate::recording::Recording;
+
+/// Steps between two calls of the observer: often enough for a progress bar, too rare to cost anything.
+const OBSERVE_EVERY: u64 = 256;
+
+/// What the observer of a run decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// Go on.
+    Continue,
+    /// Stop and keep what was recorded.
+    Stop,
+}
+
+/// A finished or interrupted run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// What was recorded.
+    pub recording: Recording,
+    /// Whether the observer stopped the run before its end.
+    pub interrupted: bool,
+    /// Whether the engine had to limit velocities.
+    pub clamp_hits: Option<ClampHits>,
+}
+
+/// Runs an experiment on an engine of its robot. `observe` is called every 256 steps with the number of steps done.
+///
+/// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time
+/// is step · dt; joints are read and torques computed; the state before the step is recorded if its turn has come; the torques are
+/// applied and the world steps. Nothing is allocated inside the loop: the recording has its final size from the start.
+///
+/// # Errors
+/// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
+pub fn run(experiment: &Experiment, engine: &mut dyn Engine, mut observe: impl FnMut(u64) -> Control) -> Result<Run, EngineError> {
+    let mut recorder = Recorder::new(experiment);
+    let mut voltages = vec![0.0; experiment.robot.actuators];
+    let mut time = 0.0;
+    let mut interrupted = false;
+    let mut done = 0;
+    while done < experiment.steps {
+        if done % OBSERVE_EVERY == 0 && observe(done) == Control::Stop {
+            interrupted = true;
+            break;
+        }
+        experiment.drive.voltages(time, &mut voltages);
+        time = done as f64 * experiment.time_step;
+        engine.prepare(&voltages)?;
+        if experiment.records(done) {
+            recorder.record(time, engine)?;
+        }
+        engine.advance()?;
+        done += 1;
+    }
+    let mut recording = recorder.recording;
+    recording.meta = experiment.meta(done, String::new());
+    Ok(Run { recording, interrupted, clamp_hits: engine.clamp_hits() })
+}
+
+/// A recording that grows in memory set aside for it.
+struct Recorder {
+    recording: Recording,
+    nodes: usize,
+}
+
+impl Recorder {
+    fn new(experiment: &Experiment) -> Self {
+        // The last step may fall beside the interval, and so does the first.
+        let records = (experiment.steps / experiment.record_every + 2) as usize;
+        let joints = experiment.robot.joints();
+        let nodes = joints + 2;
+        let of = |width: usize| Vec::with_capacity(records * width);
+        let recording = Recording {
+            meta: experiment.meta(experiment.steps, String::new()),
+            time: of(1),
+            angles: of(joints),
+            rates: of(joints),
+            torques: of(joints),
+            motor_voltages: of(joints),
+            positions: of(3 * nodes),
+            velocities: of(3 * nodes),
+        };
+        Self { recording, nodes }
+    }
+
+    fn record(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
+        let r = &mut self.recording;
+        let state = engine.joints();
+        r.time.push(time);
+        r.angles.extend_from_slice(&state.angles);
+        r.rates.extend_from_slice(&state.rates);
+        r.torques.extend_from_slice(&state.torques);
+        r.motor_voltages.extend_from_slice(&state.motor_voltages);
+        let at = r.positions.len();
+        r.positions.resize(at + 3 * self.nodes, 0.0);
+        r.velocities.resize(at + 3 * self.nodes, 0.0);
+        engine.nodes(&mut r.positions[at..], &mut r.velocities[at..])
+    }
+}

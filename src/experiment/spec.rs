@@ -1,0 +1,70 @@
+//! An experiment as a JSON object with every value filled in, in CGS units: for manifests, and for the reference scripts.
+
+use serde_json::{Value, json};
+
+use super::Experiment;
+use crate::drive::Waveform;
+use crate::model::{Damping, Film, Mount};
+
+impl Experiment {
+    /// Everything that decides the result, in CGS units and with no defaults left open.
+    pub fn spec(&self) -> Value {
+        let m = &self.robot.material;
+        let f = &self.robot.friction;
+        let (eta, time) = match self.robot.damping {
+            Damping::Eta(eta) => (Some(eta), None),
+            Damping::Time(time) => (None, Some(time)),
+        };
+        json!({
+            "material": {
+                "actuator_length": m.actuator_length, "width": m.width, "gravity": m.gravity,
+                "piezo_modulus": m.piezo_modulus, "piezo_poisson": m.piezo_poisson,
+                "piezo_thickness": m.piezo_thickness, "piezo_density": m.piezo_density,
+                "d33": m.d33, "electrode_pitch": m.electrode_pitch,
+                "substrate_modulus": m.substrate_modulus, "substrate_poisson": m.substrate_poisson,
+                "substrate_thickness": m.substrate_thickness, "substrate_density": m.substrate_density,
+                "adhesive_modulus": m.adhesive_modulus, "adhesive_thickness": m.adhesive_thickness,
+                "adhesive_density": m.adhesive_density,
+            },
+            "actuators": self.robot.actuators,
+            "motors_per_actuator": self.robot.motors_per_actuator,
+            "mount": match self.robot.mount { Mount::Ground => "ground", Mount::Clamped => "clamped", Mount::Free => "free" },
+            "damping_eta": eta,
+            "damping_time": time,
+            "collision_thickness": self.robot.collision_thickness,
+            "positive_gain": self.robot.positive_gain,
+            "friction": {
+                "ground": f.ground, "low": f.low, "high": f.high,
+                "film": match f.film { Film::BothEnds => "both-ends", Film::RightEnd => "right-end", Film::None => "none" },
+                "film_fraction": f.film_fraction,
+            },
+            "drive": self.drive_spec(),
+            "time_step": self.time_step,
+            "steps": self.steps,
+            "record_every_steps": self.record_every,
+        })
+    }
+
+    fn drive_spec(&self) -> Value {
+        // JSON has no infinity; a phase that never ends gets the largest number.
+        let finite = |t: f64| t.min(f64::MAX);
+        match &self.drive.waveform {
+            Waveform::Gait { gait, parameter, on_voltages } => {
+                json!({"waveform": "gait", "gait": gait.name, "parameter": parameter, "on_voltages": on_voltages})
+            }
+            Waveform::Dc(voltages) => json!({"waveform": "dc", "voltages": voltages}),
+            Waveform::Sine { amplitudes, frequency } => {
+                json!({"waveform": "sine", "amplitudes": amplitudes, "frequency": frequency})
+            }
+            Waveform::Step { voltages, at } => json!({"waveform": "step", "voltages": voltages, "at": at}),
+            Waveform::Sequence { period, phases } => {
+                let phases: Vec<_> = phases.iter().map(|(until, voltages)| json!([finite(*until), voltages])).collect();
+                json!({"waveform": "sequence", "period": period, "phases": phases})
+            }
+            Waveform::Table(table) => {
+                let rows: Vec<_> = (0..table.times().len()).map(|row| table.row(row)).collect();
+                json!({"waveform": "table", "times": table.times(), "voltages": rows})
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What a run leaves behind: a trajectory with the numbers needed to read it.
+
+pub mod csv;
+pub mod measures;
+pub mod npz;
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// A recording that cannot be read or written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The file is not a readable recording.
+    #[error("{}: {reason}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and where.
+        reason: String,
+    },
+    /// The file could not be written.
+    #[error("{}: {reason}", path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Numbers that go with a trajectory.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Meta {
+    /// Time step (s).
+    pub time_step: f64,
+    /// Number of steps that were simulated.
+    pub steps: u64,
+    /// Every how many steps a record was taken.
+    pub record_every: u64,
+    /// Number of actuators, N.
+    pub actuators: usize,
+    /// Motor-link units per actuator, m.
+    pub motors_per_actuator: usize,
+    /// Length of one actuator (cm).
+    pub actuator_length: f64,
+    /// Drive frequency (Hz); 1 where the drive has none, as in the reference.
+    pub driven_frequency: f64,
+    /// The reference's `dampingEta` (–).
+    pub damping_eta: f64,
+    /// For robots on the ground, as the reference saves them: low and high friction (–), and the gait's period or delay (s).
+    pub ground: Option<GroundMeta>,
+}
+
+/// What the reference saves of a robot on the ground besides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroundMeta {
+    /// Friction of the bare robot (–).
+    pub friction_low: f64,
+    /// Friction of the films (–).
+    pub friction_high: f64,
+    /// Period or delay (s); 0 where the drive has none.
+    pub period: f64,
+    /// Date and time of the run, MM_DD_YYYY_HH_MM.
+    pub date_time: String,
+}
+
+/// A trajectory: T records of J = N·m joints and J + 2 nodes, each array row after row.
+///
+/// Every record is the state before a step, with the torques of that step. Nodes are the left end, each joint and the right end, on
+/// the centre line; the joints' places lag one step behind the left end's (see [`BulletEngine`](crate::engine::BulletEngine)).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Recording {
+    /// Numbers that go with it.
+    pub meta: Meta,
+    /// Time (s), T values.
+    pub time: Vec<f64>,
+    /// Joint angles (rad), T × J.
+    pub angles: Vec<f64>,
+    /// Joint rates (rad/s), T × J.
+    pub rates: Vec<f64>,
+    /// Joint torques (dyn·cm), T × J.
+    pub torques: Vec<f64>,
+    /// Voltage on each joint, the actuator's divided by m (V), T × J.
+    pub motor_voltages: Vec<f64>,
+    /// Nodes (cm), T × (J + 2) × 3.
+    pub positions: Vec<f64>,
+    /// Velocities of the nodes (cm/s), T × (J + 2) × 3.
+    pub velocities: Vec<f64>,
+}
+
+impl Recording {
+    /// Number of records, T.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether nothing was recorded.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// Number of joints, J.
+    pub fn joints(&self) -> usize {
+        self.meta.actuators * self.meta.motors_per_actuator
+    }
+
+    /// Number of nodes, J + 2.
+    pub fn nodes(&self) -> usize {
+        self.joints() + 2
+    }
+
+    /// Position (cm) of a node in a record: x, y, z.
+    pub fn node(&self, record: usize, node: usize) -> [f64; 3] {
+        let at = 3 * (record * self.nodes() + node);
+        [self.positions[at], self.positions[at + 1], self.positions[at + 2]]
+    }
+}
