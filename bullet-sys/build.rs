@@ -59,7 +59,7 @@ fn compile_shim(bullet: &pkg_config::Library) {
         println!("cargo::rerun-if-changed={path}");
         build.file(path);
     }
-    for header in ["shim/bullet_shim.h", "shim/internal.h"] {
+    for header in ["shim/bullet_shim.h", "shim/internal.h", "shim/snapshot_state.h"] {
         println!("cargo::rerun-if-changed={header}");
     }
     build.compile("bullet_shim");

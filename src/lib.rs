@@ -3,6 +3,7 @@
 pub mod actuator;
 pub mod analytic;
 pub mod bullet;
+pub mod cli;
 pub mod crosscheck;
 pub mod drive;
 pub mod engine;

@@ -162,7 +162,8 @@ int32_t bs_snapshot_size(const bs_world *world, int32_t *size);
 int32_t bs_snapshot_take(const bs_world *world, double *data, int32_t length, char *error, int32_t error_length);
 
 /* Puts the world back, so that it continues with the same bits. The world may be another one, built by the same calls.
- * A snapshot of another make-up is refused before anything changes; after BS_ERROR_MEMORY or BS_ERROR_INTERNAL destroy the world. */
+ * Gravity and pending torques come back too. length: exactly that of the snapshot. A snapshot of another make-up is refused before
+ * anything changes; after BS_ERROR_MEMORY or BS_ERROR_INTERNAL destroy the world. */
 int32_t bs_snapshot_restore(bs_world *world, const double *data, int32_t length, char *error, int32_t error_length);
 
 #ifdef __cplusplus

@@ -1,0 +1,159 @@
+//! Output files: opened before the work starts, written whole or not at all.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde_json::{Value, json};
+use tempfile::NamedTempFile;
+
+use super::Failure;
+use crate::recording::{Recording, csv, npz};
+
+/// What a recording is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Npz,
+    Csv,
+}
+
+/// Where a recording goes.
+pub struct Output {
+    path: PathBuf,
+    format: Format,
+    /// `None`: standard output.
+    files: Option<Files>,
+}
+
+/// The result and its manifest, as temporary files beside their final places.
+struct Files {
+    result: NamedTempFile,
+    manifest: NamedTempFile,
+    manifest_path: PathBuf,
+}
+
+fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
+    Failure::Usage(format!("{}: cannot be written: {reason}", path.display()))
+}
+
+impl Output {
+    /// Opens `path`; `-` is CSV on standard output.
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        if path == Path::new("-") {
+            return Ok(Self { path: path.into(), format: Format::Csv, files: None });
+        }
+        let format = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("npz") => Format::Npz,
+            Some("csv") => Format::Csv,
+            _ => return Err(Failure::Usage(format!("{}: the name must end in .npz or .csv", path.display()))),
+        };
+        if path.is_dir() {
+            return Err(unwritable(path, &"it is a folder"));
+        }
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let temporary = || NamedTempFile::new_in(folder).map_err(|error| unwritable(path, &error));
+        let mut manifest_path = path.as_os_str().to_owned();
+        manifest_path.push(".manifest.json");
+        let files = Files { result: temporary()?, manifest: temporary()?, manifest_path: manifest_path.into() };
+        Ok(Self { path: path.into(), format, files: Some(files) })
+    }
+
+    /// Whether the recording goes to standard output, so that nothing else may.
+    pub fn is_stdout(&self) -> bool {
+        self.files.is_none()
+    }
+
+    /// The file's name, if it is one.
+    pub fn path(&self) -> Option<&Path> {
+        self.files.is_some().then_some(self.path.as_path())
+    }
+
+    /// Writes the recording and its manifest, and moves both to their places.
+    pub fn write(self, recording: &Recording, manifest: &Value) -> Result<(), Failure> {
+        let Some(Files { result, manifest: manifest_file, manifest_path }) = self.files else {
+            let mut bytes = Vec::new();
+            csv::write(recording, &mut bytes, &self.path)?;
+            return Ok(io::stdout().lock().write_all(&bytes)?);
+        };
+        let writer = BufWriter::new(result.as_file());
+        match self.format {
+            Format::Npz => npz::write(recording, writer, &self.path)?,
+            Format::Csv => csv::write(recording, writer, &self.path)?,
+        }
+        let text = format!("{manifest:#}\n");
+        manifest_file.as_file().write_all(text.as_bytes()).map_err(|error| unwritable(&manifest_path, &error))?;
+        for (file, path) in [(result, &self.path), (manifest_file, &manifest_path)] {
+            // Temporary files are private; results are as readable as any file the user makes.
+            make_readable(file.as_file()).map_err(|error| unwritable(path, &error))?;
+            file.persist(path).map_err(|error| unwritable(path, &error.error))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(unix)]
+fn make_readable(file: &std::fs::File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn make_readable(_: &std::fs::File) -> io::Result<()> {
+    Ok(())
+}
+
+/// What made a result: command line, resolved experiment, versions, wall time.
+pub fn manifest(experiment: &crate::experiment::Experiment, wall_s: f64, interrupted: bool) -> Value {
+    json!({
+        "schema": 1,
+        "command": std::env::args().collect::<Vec<_>>(),
+        "experiment": experiment.config,
+        "resolved_cgs": experiment.spec(),
+        "git_revision": env!("SFERS_GIT_REVISION"),
+        "version": env!("CARGO_PKG_VERSION"),
+        "bullet": format!("{} {}", env!("SFERS_BULLET_VERSION"), env!("SFERS_BULLET_PRECISION")),
+        // Nothing here is random.
+        "seed": null,
+        "interrupted": interrupted,
+        "wall_s": wall_s,
+        "finished": date_time('-'),
+    })
+}
+
+/// Date and time now in UTC, `MM_DD_YYYY_HH_MM` as in the reference's recordings for `_`.
+pub fn date_time(separator: char) -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
+    let (year, month, day) = civil(seconds / 86400);
+    let s = separator;
+    format!("{month:02}{s}{day:02}{s}{year:04}{s}{:02}{s}{:02}", seconds / 3600 % 24, seconds / 60 % 60)
+}
+
+/// Year, month and day of a number of days since 1970-01-01, counted off year by year and month by month.
+fn civil(mut days: u64) -> (u64, usize, u64) {
+    let leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
+    let mut year = 1970;
+    while days >= 365 + u64::from(leap(year)) {
+        days -= 365 + u64::from(leap(year));
+        year += 1;
+    }
+    let lengths = [31, 28 + u64::from(leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let mut month = 0;
+    while days >= lengths[month] {
+        days -= lengths[month];
+        month += 1;
+    }
+    (year, month + 1, days + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_become_dates_across_leap_years() {
+        assert_eq!(civil(0), (1970, 1, 1));
+        assert_eq!(civil(11016), (2000, 2, 29));
+        assert_eq!(civil(11017), (2000, 3, 1));
+        assert_eq!(civil(20454), (2026, 1, 1));
+    }
+}

@@ -1,0 +1,141 @@
+//! `sfers run`: simulate one experiment and print its measures.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use super::output::{Output, date_time, manifest};
+use super::{Failure, INTERRUPTED, Options, print};
+use crate::analytic;
+use crate::experiment::{self, Control, Experiment, Run, Source};
+use crate::recording::measures::Measures;
+
+/// Simulate an experiment and print its measures.
+///
+/// Example: sfers preset jump-14hz | sfers run - --set drive.frequency_hz=12 --out jump.npz
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The experiment file; `-` is standard input.
+    experiment: PathBuf,
+    /// Override a key, for example robot.damping_eta=0.03. May be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Save the recording: FILE.npz (the reference's keys, CGS) or FILE.csv (units in the header); `-` is CSV on standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+static INTERRUPT: AtomicBool = AtomicBool::new(false);
+
+/// Reads an experiment from a file or standard input, with settings.
+pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
+    let mut source = if path == Path::new("-") {
+        let text = std::io::read_to_string(std::io::stdin())
+            .map_err(|error| Failure::Usage(format!("standard input: {error}")))?;
+        Source::from_text("standard input", text)
+    } else {
+        Source::from_file(path)?
+    };
+    for setting in settings {
+        source.set(setting)?;
+    }
+    Ok(source)
+}
+
+pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+    let experiment = experiment::experiment(&source(&args.experiment, &args.settings)?)?;
+    let output = args.out.as_deref().map(Output::open).transpose()?;
+    let mut engine = experiment.engine()?;
+
+    let mut warnings = Vec::new();
+    let stable = analytic::stable_step(&experiment.robot);
+    if experiment.time_step > stable {
+        warnings.push(format!("the time step {:e} s is above the largest stable one, {stable:.2e} s", experiment.time_step));
+        options.remark(&format!("warning: {}", warnings[0]));
+    }
+    // The first Ctrl-C ends the run in good order; without a handler (a second one in this process) it ends at once.
+    let _ = ctrlc::set_handler(|| INTERRUPT.store(true, Ordering::Relaxed));
+
+    let bar = progress(&experiment, options);
+    let start = Instant::now();
+    let result = experiment::run(&experiment, &mut engine, |done| {
+        bar.set_position(done);
+        if INTERRUPT.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
+    });
+    let wall = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let Run { mut recording, interrupted, clamp_hits } = result?;
+
+    if let Some(hits) = clamp_hits {
+        warnings.push(format!(
+            "Bullet limited a velocity to {} (cm/s or rad/s) after {} steps, first at step {}, t = {:.6} s: from there on the \
+             motion is not that of the model; if the robot itself is that fast, nothing helps, else try a smaller time step",
+            hits.limit,
+            hits.steps,
+            hits.first_step,
+            hits.first_step as f64 * experiment.time_step
+        ));
+        options.remark(&format!("warning: {}", warnings[warnings.len() - 1]));
+    }
+    let steps = recording.meta.steps;
+    if interrupted {
+        let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
+        let message = format!("interrupted after {steps} of {} steps; what was recorded until then is {kept}", experiment.steps);
+        options.remark(&message);
+        warnings.push(message);
+    }
+    if let Some(ground) = &mut recording.meta.ground {
+        ground.date_time = date_time('_');
+    }
+
+    let measures = Measures::of(&recording, experiment.robot.mount, experiment.drive.period());
+    let steps_per_s = steps as f64 / wall.max(1e-9);
+    let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
+    let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);
+    if let Some(output) = output {
+        output.write(&recording, &manifest(&experiment, wall, interrupted))?;
+    }
+    let text = if options.json {
+        let object = json!({
+            "schema": 1,
+            "measures": measures,
+            "steps": steps,
+            "records": recording.len(),
+            "simulated_s": steps as f64 * experiment.time_step,
+            "interrupted": interrupted,
+            "warnings": warnings,
+            "out": saved,
+            "wall_s": wall,
+            "steps_per_s": steps_per_s,
+        });
+        format!("{object}\n")
+    } else {
+        let measures: String = measures.named().into_iter().map(|(name, value)| format!("{name} = {value:.6}\n")).collect();
+        options.remark(&format!(
+            "{steps} steps of {:e} s in {wall:.2} s ({steps_per_s:.0} steps/s), {} records{}",
+            experiment.time_step,
+            recording.len(),
+            saved.map_or_else(String::new, |path| format!(", saved to {}", path.display()))
+        ));
+        measures
+    };
+    if to_stdout {
+        options.remark(text.trim_end());
+    } else {
+        print(&text)?;
+    }
+    Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// A bar on stderr; indicatif hides it where stderr is no terminal.
+fn progress(experiment: &Experiment, options: Options) -> ProgressBar {
+    if options.quiet {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {per_sec}  {eta} left");
+    ProgressBar::new(experiment.steps).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
