@@ -78,7 +78,9 @@ fn bind_header() {
         .generate_comments(false)
         .layout_tests(true)
         .generate()
-        .unwrap_or_else(|error| fail(&format!("bindgen could not read the shim's header (Debian package libclang-14-dev): {error}")))
+        .unwrap_or_else(|error| {
+            fail(&format!("bindgen could not read the shim's header (Debian package libclang-14-dev): {error}"))
+        })
         .write_to_file(out.join("bindings.rs"))
         .unwrap_or_else(|error| fail(&format!("the bindings could not be written: {error}")));
 }

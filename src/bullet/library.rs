@@ -11,7 +11,8 @@ struct Facts {
     bullet_version: i32,
 }
 
-const NEEDED: Facts = Facts { abi: bullet_sys::BS_ABI_VERSION, header_scalar_size: 8, linked_scalar_size: 8, bullet_version: 324 };
+const NEEDED: Facts =
+    Facts { abi: bullet_sys::BS_ABI_VERSION, header_scalar_size: 8, linked_scalar_size: 8, bullet_version: 324 };
 
 fn compare(found: Facts) -> Result<(), BulletError> {
     for (what, found, needed) in [

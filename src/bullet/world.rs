@@ -95,7 +95,11 @@ fn positive(what: &'static str, values: &[f64]) -> Result<(), BulletError> {
 }
 
 fn not_negative(what: &'static str, value: f64) -> Result<(), BulletError> {
-    if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(BulletError::Value { what, value, needed: "zero or more and finite" }) }
+    if value.is_finite() && value >= 0.0 {
+        Ok(())
+    } else {
+        Err(BulletError::Value { what, value, needed: "zero or more and finite" })
+    }
 }
 
 fn index(value: usize) -> Result<i32, BulletError> {
@@ -244,8 +248,7 @@ impl World {
         positive("the largest impulse (dyn·s)", &[max_impulse])?;
         let mut message = Message::new();
         // SAFETY: the body's index is valid in this world (links_of); the message's length is its own.
-        let code =
-            unsafe { sys::bs_fixed_constraint_add(self.pointer(), body.index, max_impulse, message.0.as_mut_ptr(), 256) };
+        let code = unsafe { sys::bs_fixed_constraint_add(self.pointer(), body.index, max_impulse, message.0.as_mut_ptr(), 256) };
         self.checked(code, &message)
     }
 

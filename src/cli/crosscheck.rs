@@ -55,10 +55,8 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let outcomes = items.into_par_iter().map(|item| check(item, args)).collect::<Result<Vec<_>, _>>()?;
     let passes = outcomes.iter().all(|outcome| outcome.report.passes);
     if options.json {
-        let comparisons: Vec<_> = outcomes
-            .iter()
-            .map(|o| json!({"experiment": o.name, "against": o.against, "report": o.report}))
-            .collect();
+        let comparisons: Vec<_> =
+            outcomes.iter().map(|o| json!({"experiment": o.name, "against": o.against, "report": o.report})).collect();
         print(&format!("{}\n", json!({"schema": 1, "passes": passes, "comparisons": comparisons})))?;
     } else {
         let mut text: String = outcomes.iter().map(describe).collect();
@@ -113,7 +111,8 @@ fn check(item: Item, args: &Args) -> Result<Outcome, Failure> {
             (theirs, format!("PyBullet {}", versions.pybullet))
         }
         (None, None, Some(recording)) => {
-            let source = args.against.as_ref().map_or("the recording of PyBullet 3.2.7".into(), |path| path.display().to_string());
+            let source =
+                args.against.as_ref().map_or("the recording of PyBullet 3.2.7".into(), |path| path.display().to_string());
             (recording, source)
         }
         (None, None, None) => return Err(Failure::Usage("there is nothing to compare with".into())),

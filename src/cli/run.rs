@@ -34,8 +34,8 @@ static INTERRUPT: AtomicBool = AtomicBool::new(false);
 /// Reads an experiment from a file or standard input, with settings.
 pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
     let mut source = if path == Path::new("-") {
-        let text = std::io::read_to_string(std::io::stdin())
-            .map_err(|error| Failure::Usage(format!("standard input: {error}")))?;
+        let text =
+            std::io::read_to_string(std::io::stdin()).map_err(|error| Failure::Usage(format!("standard input: {error}")))?;
         Source::from_text("standard input", text)
     } else {
         Source::from_file(path)?

@@ -57,6 +57,8 @@ pub fn compare(ours: &Recording, theirs: &Recording) -> Report {
     let joints = ours.joints();
     let nodes = 3 * ours.nodes();
     let step = |record: usize| ((ours.time[record] / ours.meta.time_step).round()) as u64;
+    let length = ours.meta.actuators as f64 * ours.meta.actuator_length;
+    let position_tolerance = POSITION_TOLERANCE * (length / 50.0).max(1.0);
     let quantity = |name, unit, tolerance, width: usize, per_place: usize, first_number, a: &[f64], b: &[f64]| {
         let difference = difference(a, b).map(|(mut difference, index)| {
             difference.first_step = step(index / width);
@@ -72,7 +74,7 @@ pub fn compare(ours: &Recording, theirs: &Recording) -> Report {
         quantity("joint rates", "rad/s", 0.0, joints, 1, 1, &ours.rates, &theirs.rates),
         quantity("joint torques", "dyn cm", 0.0, joints, 1, 1, &ours.torques, &theirs.torques),
         quantity("motor voltages", "V", 0.0, joints, 1, 1, &ours.motor_voltages, &theirs.motor_voltages),
-        quantity("node positions", "cm", POSITION_TOLERANCE, nodes, 3, 0, &ours.positions, &theirs.positions),
+        quantity("node positions", "cm", position_tolerance, nodes, 3, 0, &ours.positions, &theirs.positions),
         quantity("node velocities", "cm/s", VELOCITY_TOLERANCE, nodes, 3, 0, &ours.velocities, &theirs.velocities),
     ];
     Report { passes: quantities.iter().all(|q| q.passes), mismatch, quantities }
@@ -104,10 +106,8 @@ fn difference(a: &[f64], b: &[f64]) -> Option<(Difference, usize)> {
         if a.to_bits() == b.to_bits() || a == b {
             continue;
         }
-        let (difference, _) = found.get_or_insert((
-            Difference { values: 0, largest_ulp: 0, largest: 0.0, first_step: 0, first_place: 0 },
-            index,
-        ));
+        let (difference, _) =
+            found.get_or_insert((Difference { values: 0, largest_ulp: 0, largest: 0.0, first_step: 0, first_place: 0 }, index));
         difference.values += 1;
         difference.largest_ulp = difference.largest_ulp.max(ulps(a, b));
         let size = (a - b).abs();

@@ -12,7 +12,11 @@ pub use builtin::{BUILTIN, Builtin};
 pub use compare::{Difference, Quantity, Report, compare};
 pub use python::{AuthorsRun, CrosscheckError, Versions, authors_run, run_authors, run_pybullet};
 
-/// How far positions of nodes may differ (cm): single precision at 50 cm is 50 · 2⁻²⁴ = 3·10⁻⁶ cm.
+/// How far positions of nodes may differ (cm), for robots up to 50 cm long, the reference's size; in proportion beyond.
+///
+/// PyBullet rounds a link's position and then its frame's to single precision, and the right end adds to that: three roundings of
+/// half a unit in the last place, which is 1.9·10⁻⁶ cm between 32 and 64 cm and 3.8·10⁻⁶ cm between 64 and 128 cm. The rest is for
+/// the ends' pitch, as under [`VELOCITY_TOLERANCE`].
 pub const POSITION_TOLERANCE: f64 = 1e-5;
 
 /// How far velocities of nodes may differ (cm/s). The ends' velocities turn with the ends' pitch, which PyBullet takes from Euler

@@ -98,7 +98,8 @@ fn run_script(script: &str, mut spec: Value, python: &Path) -> Result<(Recording
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         // PyBullet says when it was built, whatever happens.
-        let last = text.lines().rfind(|line| !line.trim().is_empty() && !line.contains("build time")).unwrap_or("it said nothing");
+        let last =
+            text.lines().rfind(|line| !line.trim().is_empty() && !line.contains("build time")).unwrap_or("it said nothing");
         return Err(failed(last.to_owned()));
     }
     if let Some(Err(error)) = written {

@@ -210,9 +210,8 @@ impl Gait {
     /// The actuators that are on at time `t` (s), for a period or parameter `p` (s), as a mask of `0` and `1`.
     pub fn mask(&self, t: f64, p: f64) -> &'static str {
         let (once, p_once) = if p < 0.0 { (self.once_if_negative, p.abs()) } else { (self.once, p) };
-        let phase = |phases: &'static [Phase], t: f64, p: f64| {
-            phases.iter().find(|(bound, _)| t < bound.time(p)).map(|&(_, mask)| mask)
-        };
+        let phase =
+            |phases: &'static [Phase], t: f64, p: f64| phases.iter().find(|(bound, _)| t < bound.time(p)).map(|&(_, mask)| mask);
         phase(once, t, p_once)
             .or_else(|| if self.cycle.is_empty() { None } else { phase(self.cycle, t % p, p) })
             .unwrap_or("00000")
@@ -229,8 +228,14 @@ mod tests {
 
     #[test]
     fn cyclic_gaits_pass_their_phases_in_equal_parts_and_repeat() {
-        assert_eq!(masks("inchworm", 1.0, &[0.0, 0.3, 0.6, 0.9, 1.0, 1.3]), ["00000", "01110", "11110", "10000", "00000", "01110"]);
-        assert_eq!(masks("full-frictional-inchworm", 0.5, &[0.05, 0.15, 0.25, 0.35, 0.45]), ["00000", "10000", "11110", "01111", "00001"]);
+        assert_eq!(
+            masks("inchworm", 1.0, &[0.0, 0.3, 0.6, 0.9, 1.0, 1.3]),
+            ["00000", "01110", "11110", "10000", "00000", "01110"]
+        );
+        assert_eq!(
+            masks("full-frictional-inchworm", 0.5, &[0.05, 0.15, 0.25, 0.35, 0.45]),
+            ["00000", "10000", "11110", "01111", "00001"]
+        );
         assert_eq!(masks("crawl", 0.1, &[0.04, 0.06, 0.14]), ["00000", "01110", "00000"]);
     }
 

@@ -60,7 +60,9 @@ mod tests {
     fn a_table_is_linear_between_rows_and_held_at_the_ends() {
         let table = Table::new(vec![1.0, 2.0, 4.0], vec![0.0, 10.0, 100.0, 20.0, -100.0, 0.0], 2).unwrap();
         let mut out = [0.0; 2];
-        for (t, expected) in [(0.0, [0.0, 10.0]), (1.5, [50.0, 15.0]), (2.0, [100.0, 20.0]), (3.0, [0.0, 10.0]), (9.0, [-100.0, 0.0])] {
+        for (t, expected) in
+            [(0.0, [0.0, 10.0]), (1.5, [50.0, 15.0]), (2.0, [100.0, 20.0]), (3.0, [0.0, 10.0]), (9.0, [-100.0, 0.0])]
+        {
             table.at(t, &mut out);
             assert_eq!(out, expected, "at {t}");
         }

@@ -216,14 +216,13 @@ impl Source {
     /// # Errors
     /// [`ConfigError::Syntax`].
     pub fn parse(&self) -> Result<Config, ConfigError> {
-        let syntax = |source_name: String, message: String| ConfigError::Syntax { source_name, message: message.trim_end().into() };
-        let config: Config =
-            toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
+        let syntax =
+            |source_name: String, message: String| ConfigError::Syntax { source_name, message: message.trim_end().into() };
+        let config: Config = toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
         if self.settings.is_empty() {
             return Ok(config);
         }
-        let mut table: Table =
-            toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
+        let mut table: Table = toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
         for (key, value) in &self.settings {
             let name = || format!("--set {key}={value}");
             // `v = VALUE` is TOML if VALUE is; a bare word is taken as a string.

@@ -197,7 +197,9 @@ fn present(d: &DriveConfig) -> Vec<&'static str> {
 
 fn only(d: &DriveConfig, whose: &str, allowed: &[&str]) -> Result<(), Fault> {
     match present(d).into_iter().find(|key| !allowed.contains(key)) {
-        Some(key) => Err(Fault::new(format!("drive.{key}"), format!("does not belong to {whose}; it takes {}", allowed.join(", ")))),
+        Some(key) => {
+            Err(Fault::new(format!("drive.{key}"), format!("does not belong to {whose}; it takes {}", allowed.join(", "))))
+        }
         None => Ok(()),
     }
 }
@@ -227,9 +229,7 @@ fn period(d: &DriveConfig) -> Result<Option<f64>, Fault> {
     match (d.period_s, d.frequency_hz) {
         (Some(_), Some(_)) => Err(Fault::new("drive.frequency_hz", "period_s is given as well; keep one of the two")),
         (Some(period), None) => positive("drive.period_s", period).map(Some),
-        (None, Some(frequency)) => {
-            positive("drive.period_s", 1.0 / positive("drive.frequency_hz", frequency)?).map(Some)
-        }
+        (None, Some(frequency)) => positive("drive.period_s", 1.0 / positive("drive.frequency_hz", frequency)?).map(Some),
         (None, None) => Ok(None),
     }
 }
@@ -283,7 +283,8 @@ fn gait_waveform(d: &DriveConfig, robot: &Robot) -> Result<Waveform, Fault> {
         Fault::new("drive.gait", format!("{name:?} is not one of {}", names.join(", ")))
     })?;
     if robot.actuators != 5 {
-        let message = format!("gaits are written for 5 actuators, but robot.actuators is {}; use waveform sequence", robot.actuators);
+        let message =
+            format!("gaits are written for 5 actuators, but robot.actuators is {}; use waveform sequence", robot.actuators);
         return Err(Fault::new("drive.gait", message));
     }
     let own = format!("gait {name}");
@@ -302,9 +303,8 @@ fn gait_waveform(d: &DriveConfig, robot: &Robot) -> Result<Waveform, Fault> {
         Parameter::Delay => d.delay_s,
         Parameter::OnTime => d.on_time_s,
     };
-    let parameter = given
-        .or(gait.default_parameter)
-        .ok_or_else(|| Fault::new(&key, format!("is missing; gait {name} needs it")))?;
+    let parameter =
+        given.or(gait.default_parameter).ok_or_else(|| Fault::new(&key, format!("is missing; gait {name} needs it")))?;
     finite(&key, parameter)?;
     if parameter < 0.0 && gait.once_if_negative.is_empty() {
         return Err(Fault::new(&key, format!("is {parameter}, but must not be negative for gait {name}")));

@@ -35,7 +35,11 @@ pub struct Run {
 ///
 /// # Errors
 /// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
-pub fn run(experiment: &Experiment, engine: &mut dyn Engine, mut observe: impl FnMut(u64) -> Control) -> Result<Run, EngineError> {
+pub fn run(
+    experiment: &Experiment,
+    engine: &mut dyn Engine,
+    mut observe: impl FnMut(u64) -> Control,
+) -> Result<Run, EngineError> {
     let mut recorder = Recorder::new(experiment);
     let mut voltages = vec![0.0; experiment.robot.actuators];
     let mut time = 0.0;

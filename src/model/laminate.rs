@@ -170,8 +170,7 @@ impl Laminate {
         let z_s = -0.5 * h_s - neutral_axis;
 
         let own = e_p * cube(h_p) + e_a * cube(h_a) + e_s * cube(h_s);
-        let flexural_rigidity =
-            own + e_p * h_p * z_p.powf(2.0) + e_a * h_a * z_a.powf(2.0) + e_s * h_s * z_s.powf(2.0);
+        let flexural_rigidity = own + e_p * h_p * z_p.powf(2.0) + e_a * h_a * z_a.powf(2.0) + e_s * h_s * z_s.powf(2.0);
 
         let strain_per_volt = m.d33 * (1.0 + m.piezo_poisson) / m.electrode_pitch;
         let curvature_per_volt = strain_per_volt * z_p * e_p * h_p / flexural_rigidity;

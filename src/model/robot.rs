@@ -168,9 +168,7 @@ impl Robot {
     /// [`ModelError`] names the key of the experiment file at fault.
     pub fn check(&self) -> Result<(), ModelError> {
         self.material.check()?;
-        for (key, value) in
-            [("robot.actuators", self.actuators), ("robot.motors_per_actuator", self.motors_per_actuator)]
-        {
+        for (key, value) in [("robot.actuators", self.actuators), ("robot.motors_per_actuator", self.motors_per_actuator)] {
             ModelError::unless((1..=MAX_JOINTS).contains(&value), key, value as f64, "between 1 and 10000")?;
         }
         ModelError::unless(
@@ -197,12 +195,7 @@ impl Robot {
             ModelError::unless(value.is_finite() && value > 0.0, key, value, "positive")?;
         }
         let fraction = self.friction.film_fraction;
-        ModelError::unless(
-            fraction.is_finite() && fraction >= 0.0,
-            "robot.friction.film_fraction",
-            fraction,
-            "zero or more",
-        )?;
+        ModelError::unless(fraction.is_finite() && fraction >= 0.0, "robot.friction.film_fraction", fraction, "zero or more")?;
         let films = match self.friction.film {
             Film::BothEnds => 2 * self.film_segments(),
             Film::RightEnd => self.film_segments(),

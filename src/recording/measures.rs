@@ -44,16 +44,14 @@ impl Measures {
         if mount == Mount::Clamped {
             let tip = |record: usize| mm_from_cm(recording.node(record, recording.nodes() - 1)[2]);
             let window = period_start.unwrap_or(0)..=last;
-            let (low, high) = window
-                .map(tip)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+            let (low, high) =
+                window.map(tip).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
             measures.tip_deflection_mm = Some(tip(last));
             measures.tip_amplitude_mm = Some((high - low) / 2.0);
             return measures;
         }
-        let lowest = |record: usize| {
-            (0..recording.nodes()).map(|node| recording.node(record, node)[2]).fold(f64::INFINITY, f64::min)
-        };
+        let lowest =
+            |record: usize| (0..recording.nodes()).map(|node| recording.node(record, node)[2]).fold(f64::INFINITY, f64::min);
         let mean_x = |record: usize| {
             (0..recording.nodes()).map(|node| recording.node(record, node)[0]).sum::<f64>() / recording.nodes() as f64
         };

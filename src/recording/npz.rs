@@ -109,8 +109,8 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<Recording, RecordingError> {
 /// # Errors
 /// As [`read`], and if the file cannot be opened.
 pub fn read_file(path: &Path) -> Result<Recording, RecordingError> {
-    let bytes = std::fs::read(path)
-        .map_err(|error| RecordingError::Unreadable { path: path.into(), reason: error.to_string() })?;
+    let bytes =
+        std::fs::read(path).map_err(|error| RecordingError::Unreadable { path: path.into(), reason: error.to_string() })?;
     read(&bytes, path)
 }
 

@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# All set-up and all tests, on a fresh Debian 12 with Rust.
+#
+#   bash scripts/test.sh          the tests of `cargo test`, the live PyBullet check among them
+#   bash scripts/test.sh --long   besides: the shim under sanitizers, a run under valgrind, the refusal of a machine without Bullet
+#
+# CI sets CI=true, which means --long.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+long=false
+if [ "${1:-}" = --long ] || [ "${CI:-}" = true ]; then long=true; fi
+packages=(build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv)
+if $long; then packages+=(valgrind); fi
+bash scripts/debian.sh "${packages[@]}"
+bash scripts/python.sh
+
+step() { printf '\n== %s\n' "$*"; }
+
+step "tests"
+cargo test --release --locked --workspace
+
+if $long; then
+  step "shim under ASan, UBSan and TSan"
+  bash scripts/sanitize.sh
+  step "one short run under valgrind"
+  bash scripts/valgrind.sh
+  step "a build without Bullet names the Debian package"
+  bash scripts/no_bullet.sh
+fi
+step "all passed"
