@@ -48,7 +48,7 @@ fn drive(n: usize) -> BoxedStrategy<String> {
 fn robot(n: usize) -> impl Strategy<Value = (String, f64)> {
     let shape = (1..=6usize, prop::bool::ANY, 40.0..120.0f64, prop::bool::weighted(0.3), 0.5..1.5f64);
     let friction = (0.1..2.0f64, 0.1..3.0f64, 0.5..6.0f64, prop::sample::select(vec!["both-ends", "right-end", "none"]));
-    (shape, friction, 0.005..0.2f64, 1.0..1.8f64, drive(n), 0.02..0.5f64).prop_map(
+    (shape, friction, 0.005..0.2f64, 1.0..1.8f64, drive(n), 0.1..0.6f64).prop_map(
         move |((m, four, length, clamped, thickness), (ground, low, high, film), damping, gain, drive, share)| {
             let preset = if four { "parameter-4" } else { "parameter-2" };
             let mount = if clamped { "clamped" } else { "ground" };
@@ -101,7 +101,7 @@ fn twenty_random_robots_have_equal_bits_on_a_live_pybullet() {
                         let file = toml::to_string(&experiment.config).unwrap();
                         failures.lock().unwrap().push(format!("robot {i}: {:?} {differing:#?}\n{file}", report.mismatch));
                     }
-                    *moved.lock().unwrap() += usize::from(run.recording.angles.iter().any(|angle| angle.abs() > 0.01));
+                    *moved.lock().unwrap() += usize::from(run.recording.angles.iter().any(|angle| angle.abs() > 1e-3));
                 }
             });
         }
@@ -109,5 +109,6 @@ fn twenty_random_robots_have_equal_bits_on_a_live_pybullet() {
     let failures = failures.into_inner().unwrap();
     assert!(failures.is_empty(), "{} of {ROBOTS} differ:\n{}", failures.len(), failures.join("\n"));
     // Robots that do not move would agree without proving anything.
-    assert!(moved.into_inner().unwrap() >= ROBOTS * 3 / 4);
+    let moved = moved.into_inner().unwrap();
+    assert!(moved >= ROBOTS * 3 / 4, "only {moved} of {ROBOTS} bend by more than 1e-3 rad");
 }

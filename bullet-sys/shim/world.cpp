@@ -47,9 +47,12 @@ int32_t bs_bullet_version(void) { return btGetVersion(); }
 
 int32_t bs_linked_scalar_size(void) {
   // A function that takes a scalar by value carries the scalar's type in its symbol (d or f), so the loaded libraries can be asked
-  // without calling into code of the wrong precision.
-  if (dlsym(RTLD_DEFAULT, "_ZNK10btBoxShape21calculateLocalInertiaEdR9btVector3") != nullptr) return sizeof(double);
-  if (dlsym(RTLD_DEFAULT, "_ZNK10btBoxShape21calculateLocalInertiaEfR9btVector3") != nullptr) return sizeof(float);
+  // without calling into code of the wrong precision. Taking the function's address keeps the library linked even in a program
+  // that uses nothing else of it.
+  void (btMultiBody::*volatile anchor)(btScalar, btScalar *, btScalar *) = &btMultiBody::stepPositionsMultiDof;
+  (void)anchor;
+  if (dlsym(RTLD_DEFAULT, "_ZN11btMultiBody21stepPositionsMultiDofEdPdS0_") != nullptr) return sizeof(double);
+  if (dlsym(RTLD_DEFAULT, "_ZN11btMultiBody21stepPositionsMultiDofEfPfS0_") != nullptr) return sizeof(float);
   return 0;
 }
 
