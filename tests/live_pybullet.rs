@@ -29,7 +29,7 @@ fn drive(n: usize) -> BoxedStrategy<String> {
     let dc = voltages().prop_map(|v| format!("waveform = \"dc\"\nvoltages_v = {v:?}"));
     let sine =
         (voltages(), 5.0..60.0f64).prop_map(|(v, f)| format!("waveform = \"sine\"\namplitudes_v = {v:?}\nfrequency_hz = {f:?}"));
-    let step = (voltages(), 0.0..0.01f64).prop_map(|(v, at)| format!("waveform = \"step\"\nvoltages_v = {v:?}\nat_s = {at:?}"));
+    let step = (voltages(), 0.0..0.0005f64).prop_map(|(v, at)| format!("waveform = \"step\"\nvoltages_v = {v:?}\nat_s = {at:?}"));
     let sequence = (voltages(), voltages(), 0.005..0.03f64, 0.2..0.8f64).prop_map(|(a, b, period, share)| {
         format!(
             "waveform = \"sequence\"\nperiod_s = {period:?}\nphases = [ {{ until = {share:?}, voltages_v = {a:?} }}, \
@@ -48,7 +48,7 @@ fn drive(n: usize) -> BoxedStrategy<String> {
 fn robot(n: usize) -> impl Strategy<Value = (String, f64)> {
     let shape = (1..=6usize, prop::bool::ANY, 40.0..120.0f64, prop::bool::weighted(0.3), 0.5..1.5f64);
     let friction = (0.1..2.0f64, 0.1..3.0f64, 0.5..6.0f64, prop::sample::select(vec!["both-ends", "right-end", "none"]));
-    (shape, friction, 0.005..0.2f64, 1.0..1.8f64, drive(n), 0.1..0.6f64).prop_map(
+    (shape, friction, 0.005..0.08f64, 1.0..1.8f64, drive(n), 0.2..0.8f64).prop_map(
         move |((m, four, length, clamped, thickness), (ground, low, high, film), damping, gain, drive, share)| {
             let preset = if four { "parameter-4" } else { "parameter-2" };
             let mount = if clamped { "clamped" } else { "ground" };
@@ -58,7 +58,7 @@ fn robot(n: usize) -> impl Strategy<Value = (String, f64)> {
                 "[material]\npreset = \"{preset}\"\nactuator_length_mm = {length:?}\n[robot]\nactuators = {n}\n\
                  motors_per_actuator = {m}\nmount = \"{mount}\"\ndamping_eta = {damping:?}\npositive_gain = {gain:?}\n\
                  collision_thickness_mm = {thickness:?}\n[robot.friction]\nground = {ground:?}\nlow = {low:?}\nhigh = {high:?}\n\
-                 film = \"{film}\"\n[drive]\n{drive}\n[simulation]\ntime_step_s = 1e-9\nsteps = 5000\nrecord_every_steps = 50\n"
+                 film = \"{film}\"\n[drive]\n{drive}\n[simulation]\ntime_step_s = 1e-9\nsteps = 8000\nrecord_every_steps = 50\n"
             );
             (text, share)
         },
