@@ -149,9 +149,12 @@ fn boxes(robot: &Robot) -> Vec<BoxLink> {
     boxes.collect()
 }
 
-/// Pitch about +y of a body whose x axis points along (x, z) in the world (rad): positive lowers the far end.
-fn pitch(x: f64, z: f64) -> f64 {
-    (-z).atan2(x)
+/// Pitch about +y of a body whose x axis points along (x, y, z) in the world (rad): positive lowers the far end.
+///
+/// For motion in the plane this is atan2(−z, x). Out of it, where contact has tilted or turned the robot a little, it is the
+/// angle to the horizontal, which is what PyBullet's Euler angles give the reference; beyond 90° those fold back and this does not.
+fn pitch([x, y, z]: [f64; 3]) -> f64 {
+    (-z).atan2(x.hypot(y).copysign(x))
 }
 
 impl Engine for BulletEngine {
@@ -190,7 +193,7 @@ impl Engine for BulletEngine {
 
         // First column of the base's rotation: its x axis in the world.
         let [qx, qy, qz, qw] = base.orientation;
-        let p = pitch(1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qz - qw * qy));
+        let p = pitch([1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz), 2.0 * (qx * qz - qw * qy)]);
         let lever = half / 2.0;
         let rate = base.angular_velocity[1];
         positions[..3].copy_from_slice(&[base.position[0] - lever * p.cos(), 0.0, base.position[2] + lever * p.sin()]);
@@ -211,7 +214,7 @@ impl Engine for BulletEngine {
         }
 
         let last = &self.links[joints - 1];
-        let p = pitch(last.rotation[0][0], last.rotation[2][0]);
+        let p = pitch([last.rotation[0][0], last.rotation[1][0], last.rotation[2][0]]);
         let rate = last.angular_velocity[1];
         let joint = [positions[3 * joints], 0.0, positions[3 * joints + 2]];
         let end = 3 * (joints + 1);
