@@ -5,6 +5,6 @@ cd "$(dirname "$0")/.."
 
 cargo build --release --locked
 target/release/sfers preset jump-14hz |
-  valgrind --quiet --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite \
+  valgrind --quiet --error-exitcode=9 --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite \
     target/release/sfers run - --quiet --set simulation.duration_s=0.002 > /dev/null
 echo "valgrind: clean"

@@ -21,5 +21,5 @@ pub const POSITION_TOLERANCE: f64 = 1e-5;
 
 /// How far velocities of nodes may differ (cm/s). The ends' velocities turn with the ends' pitch, which PyBullet takes from Euler
 /// angles: it differs from the direction of the link's x axis when contact tilts the robot a little out of its plane. Measured on the
-/// fourteen recordings: at most 2.1·10⁻⁵ cm/s.
+/// fourteen recordings: at most 1.6·10⁻⁵ cm/s.
 pub const VELOCITY_TOLERANCE: f64 = 1e-4;

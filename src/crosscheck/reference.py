@@ -4,9 +4,8 @@ This is the far side of `sfers crosscheck`. It is written from the published rec
 drive and torque law are computed here once more, so a mistake on either side shows. CGS units (cm, g, s, dyn, V) throughout.
 
 Input: keys `material`, `actuators`, `motors_per_actuator`, `mount` (ground | clamped | free), `damping_eta` or `damping_time` (the
-other null), `collision_thickness`, `positive_gain`, `friction`, `drive`, `time_step`, `steps`, `record_every_steps`, `out`; optionally
-`bench`. Output: the recording in `out`, and on standard output one line with the versions used, or with the speed if `bench` is
-"reference" (every call and list that the reference makes in a step) or "lean" (only what a step needs).
+other null), `collision_thickness`, `positive_gain`, `friction`, `drive`, `time_step`, `steps`, `record_every_steps`, `out`.
+Output: the recording in `out`, and on standard output one line with the versions used.
 
 Exit codes: 0 done; 3 PyBullet or numpy cannot be imported; 4 PyBullet refused the robot, or the state stopped being finite.
 The order of operations is part of the recipe: equal order, equal bits.
@@ -19,7 +18,6 @@ import math
 import os
 import platform
 import sys
-import time
 
 # Bullet prints to the C library's stdout. Keep the real one for the answer and send the rest to stderr.
 ANSWER = os.fdopen(os.dup(1), "w")
@@ -310,28 +308,17 @@ def record(spec, robot, torques):
     }
 
 
-def bench(spec, robot, torques):
-    """Steps per second of wall time; set-up is not counted and nothing is kept."""
-    reads_all = {"reference": True, "lean": False}[spec["bench"]]
-    start = time.perf_counter()
-    simulate(spec, robot, torques, lambda _: reads_all, lambda *_: None)
-    return spec["steps"] / (time.perf_counter() - start)
-
-
 def main():
     spec = json.load(sys.stdin)
     EI, beta, mass = laminate(spec["material"])
     torques = torque_law(spec, EI, beta)
     try:
         robot = build(spec, mass)
-        if spec.get("bench"):
-            answer = {"steps_per_s": bench(spec, robot, torques)}
-        else:
-            recording = record(spec, robot, torques)
-            with open(spec["out"], "wb") as file:  # a name instead of a file would get ".npz" appended
-                numpy.savez(file, **recording)
-            answer = {name: importlib.metadata.version(name) for name in ("pybullet", "numpy")}
-            answer["python"] = platform.python_version()
+        recording = record(spec, robot, torques)
+        with open(spec["out"], "wb") as file:  # a name instead of a file would get ".npz" appended
+            numpy.savez(file, **recording)
+        answer = {name: importlib.metadata.version(name) for name in ("pybullet", "numpy")}
+        answer["python"] = platform.python_version()
     except (pybullet.error, ArithmeticError) as error:
         fail(4, error)
     print(json.dumps(answer), file=ANSWER, flush=True)
