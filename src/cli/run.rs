@@ -73,26 +73,30 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     if let Some(hits) = clamp_hits {
         warnings.push(format!(
             "Bullet limited a velocity to {} (cm/s or rad/s) after {} steps, first at step {}, t = {:.6} s: from there on the \
-             motion is not that of the model; if the robot itself is that fast, nothing helps, else try a smaller time step",
+             motion is not that of the model, and no measures are given; try a smaller time step, or look at the recording",
             hits.limit,
             hits.steps,
             hits.first_step,
             hits.first_step as f64 * experiment.time_step
         ));
-        options.remark(&format!("warning: {}", warnings[warnings.len() - 1]));
+        // Even when quiet: the result is not what was asked for.
+        eprintln!("warning: {}", warnings[warnings.len() - 1]);
     }
     let steps = recording.meta.steps;
     if interrupted {
         let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
         let message = format!("interrupted after {steps} of {} steps; what was recorded until then is {kept}", experiment.steps);
-        options.remark(&message);
+        eprintln!("{message}");
         warnings.push(message);
     }
     if let Some(ground) = &mut recording.meta.ground {
         ground.date_time = date_time('_');
     }
 
-    let measures = Measures::of(&recording, experiment.robot.mount, experiment.drive.period());
+    let measures = match clamp_hits {
+        Some(_) => Measures::default(),
+        None => Measures::of(&recording, experiment.robot.mount, experiment.drive.period()),
+    };
     let steps_per_s = steps as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);

@@ -19,7 +19,7 @@ pub use python::{AuthorsRun, CrosscheckError, Versions, authors_run, run_authors
 /// the ends' pitch, as under [`VELOCITY_TOLERANCE`].
 pub const POSITION_TOLERANCE: f64 = 1e-5;
 
-/// How far velocities of nodes may differ (cm/s). The ends' velocities turn with the ends' pitch, which PyBullet takes from Euler
-/// angles: it differs from the direction of the link's x axis when contact tilts the robot a little out of its plane. Measured on the
-/// fourteen recordings: at most 1.6·10⁻⁵ cm/s.
+/// How far velocities of nodes may differ (cm/s). The right end's velocity is turned by a lever of up to 5 cm and a rate of up to
+/// 100 rad/s (Bullet's clamp), and PyBullet takes the lever's direction from an orientation in single precision, which is off by
+/// 2⁻²⁴ rad: 3·10⁻⁵ cm/s. Measured on the fourteen recordings: at most 1.6·10⁻⁵ cm/s.
 pub const VELOCITY_TOLERANCE: f64 = 1e-4;

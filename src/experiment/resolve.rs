@@ -7,7 +7,7 @@ use super::{Experiment, drive_csv};
 use crate::drive::gait::{self, Parameter};
 use crate::drive::{Drive, Waveform};
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
-use crate::model::{Damping, Film, Friction, Material, Mount, Robot};
+use crate::model::{Damping, Film, Friction, Material, ModelError, Mount, Robot};
 
 /// The reference's `dampingEta` where a file gives no damping.
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
@@ -41,7 +41,9 @@ pub fn experiment(source: &Source) -> Result<Experiment, ConfigError> {
 
 fn resolve(config: &Config, folder: &Path) -> Result<Experiment, Trouble> {
     let robot = robot(config)?;
-    robot.check().map_err(|error| Fault::new(error.key(), error.to_string()))?;
+    robot.check().map_err(|ModelError::Value { key, value, needed }| {
+        Fault::new(key, format!("is {value} in the program's CGS units, but must be {needed}"))
+    })?;
     let (time_step, steps, record_every) = simulation(config, &robot)?;
     let waveform = waveform(&config.drive, &robot, time_step, folder)?;
     let drive = Drive { waveform, positive_gain: robot.positive_gain };

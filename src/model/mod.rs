@@ -40,11 +40,4 @@ impl ModelError {
     fn unless(holds: bool, key: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
         if holds { Ok(()) } else { Err(Self::Value { key, value, needed }) }
     }
-
-    /// The key of the experiment file at fault.
-    pub fn key(&self) -> &'static str {
-        match self {
-            Self::Value { key, .. } => key,
-        }
-    }
 }
