@@ -21,7 +21,7 @@ extern "C" {
 /* ---- identity ------------------------------------------------------------------------------------------------------ */
 
 /* Raised whenever a signature, a structure or a constant of this header changes. */
-#define BS_ABI_VERSION 1
+#define BS_ABI_VERSION 2
 
 #define BS_OK 0
 #define BS_ERROR_ARGUMENT 1  /* a null pointer, a wrong length, an index out of range, a value that Bullet would assert on */
@@ -119,12 +119,9 @@ int32_t bs_base_state(const bs_world *world, int32_t body, double *state, int32_
 int32_t bs_base_state_set(bs_world *world, int32_t body, const double *state, int32_t length);
 
 /* Links, as cached by the last step (they lag one step behind the joints, as in PyBullet without computeForwardKinematics).
- * Each link takes 15 values: centre of mass (3, cm), rotation matrix link to world by rows (9), velocity of the centre of mass (3, cm/s).
- * The velocity is of the current joint rates, turned by the cached rotation. */
+ * Each link takes 18 values: centre of mass (3, cm), rotation matrix link to world by rows (9), velocity of the centre of mass
+ * (3, cm/s), angular velocity (3, rad/s). The velocities are of the current joint rates, turned by the cached rotation. */
 int32_t bs_link_states(bs_world *world, int32_t body, double *states, int32_t length);
-
-/* Angular velocities (rad/s) that go with bs_link_states: 3 values a link. */
-int32_t bs_link_angular_velocities(bs_world *world, int32_t body, double *rates, int32_t length);
 
 /* The velocity that Bullet clamps every generalised velocity of `body` to (btMultiBody::getMaxCoordinateVelocity), and the largest
  * magnitude of a generalised velocity now (cm/s or rad/s). Equal values mean that the clamp has bitten. */

@@ -238,40 +238,26 @@ int32_t bs_base_state_set(bs_world *world, int32_t body, const double *state, in
   });
 }
 
-// Velocities of all bodies of the tree, each in its own frame (the base's first), into the world's scratch.
-static void tree_velocities(bs_world &world, const btMultiBody &multibody) {
-  const size_t count = static_cast<size_t>(multibody.getNumLinks()) + 1;
-  if (world.scratch_linear.size() < count) {
-    world.scratch_linear.resize(count);
-    world.scratch_angular.resize(count);
-  }
-  multibody.compTreeLinkVelocities(world.scratch_angular.data(), world.scratch_linear.data());
-}
-
 int32_t bs_link_states(bs_world *world, int32_t body, double *states, int32_t length) {
   return bs::guarded(nullptr, 0, [&] {
     require(world != nullptr && states != nullptr, "null pointer");
     const btMultiBody &multibody = world->multibody(body);
-    require(length == 15 * multibody.getNumLinks(), "15 values per link");
-    tree_velocities(*world, multibody);
+    require(length == 18 * multibody.getNumLinks(), "18 values per link");
+    // Velocities of all bodies of the tree, each in its own frame, the base's first.
+    const size_t count = static_cast<size_t>(multibody.getNumLinks()) + 1;
+    if (world->scratch_linear.size() < count) {
+      world->scratch_linear.resize(count);
+      world->scratch_angular.resize(count);
+    }
+    multibody.compTreeLinkVelocities(world->scratch_angular.data(), world->scratch_linear.data());
     for (int i = 0; i < multibody.getNumLinks(); ++i) {
       const btTransform &transform = multibody.getLink(i).m_cachedWorldTransform;
-      double *out = states + 15 * i;
+      const size_t at = static_cast<size_t>(i) + 1;
+      double *out = states + 18 * i;
       bs::store(out, transform.getOrigin());
       for (int row = 0; row < 3; ++row) bs::store(out + 3 + 3 * row, transform.getBasis()[row]);
-      bs::store(out + 12, transform.getBasis() * world->scratch_linear[static_cast<size_t>(i) + 1]);
-    }
-  });
-}
-
-int32_t bs_link_angular_velocities(bs_world *world, int32_t body, double *rates, int32_t length) {
-  return bs::guarded(nullptr, 0, [&] {
-    require(world != nullptr && rates != nullptr, "null pointer");
-    const btMultiBody &multibody = world->multibody(body);
-    require(length == 3 * multibody.getNumLinks(), "3 values per link");
-    tree_velocities(*world, multibody);
-    for (int i = 0; i < multibody.getNumLinks(); ++i) {
-      bs::store(rates + 3 * i, multibody.getLink(i).m_cachedWorldTransform.getBasis() * world->scratch_angular[static_cast<size_t>(i) + 1]);
+      bs::store(out + 12, transform.getBasis() * world->scratch_linear[at]);
+      bs::store(out + 15, transform.getBasis() * world->scratch_angular[at]);
     }
   });
 }

@@ -114,8 +114,7 @@ void observe(World &world, Numbers &out) {
     double *at = state.data();
     CHECK(bs_base_state(world.handle, body, at, 13) == BS_OK);
     CHECK(bs_joint_states(world.handle, body, at + 13, at + 13 + n, links) == BS_OK);
-    CHECK(bs_link_states(world.handle, body, at + 13 + 2 * n, 15 * links) == BS_OK);
-    CHECK(bs_link_angular_velocities(world.handle, body, at + 13 + 17 * n, 3 * links) == BS_OK);
+    CHECK(bs_link_states(world.handle, body, at + 13 + 2 * n, 18 * links) == BS_OK);
     CHECK(bs_velocity_clamp(world.handle, body, at + 13 + 20 * n, at + 14 + 20 * n) == BS_OK);
     out.insert(out.end(), state.begin(), state.end());
   }
@@ -241,8 +240,7 @@ void misuse() {
     CHECK(bs_joint_torques_set(w, index, a.data(), LINKS) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state(w, index, a.data(), 13) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state_set(w, index, a.data(), 13) == BS_ERROR_ARGUMENT);
-    CHECK(bs_link_states(w, index, a.data(), 15 * LINKS) == BS_ERROR_ARGUMENT);
-    CHECK(bs_link_angular_velocities(w, index, a.data(), 3 * LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_link_states(w, index, a.data(), 18 * LINKS) == BS_ERROR_ARGUMENT);
     CHECK(bs_velocity_clamp(w, index, a.data(), b.data()) == BS_ERROR_ARGUMENT);
   }
   for (int32_t off : {-1, 1}) {
@@ -251,8 +249,7 @@ void misuse() {
     CHECK(bs_joint_torques_set(w, 1, a.data(), LINKS + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state(w, 1, a.data(), 13 + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state_set(w, 1, a.data(), 13 + off) == BS_ERROR_ARGUMENT);
-    CHECK(bs_link_states(w, 1, a.data(), 15 * LINKS + off) == BS_ERROR_ARGUMENT);
-    CHECK(bs_link_angular_velocities(w, 1, a.data(), 3 * LINKS + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_link_states(w, 1, a.data(), 18 * LINKS + off) == BS_ERROR_ARGUMENT);
   }
   CHECK(bs_joint_states(w, 1, nullptr, b.data(), LINKS) == BS_ERROR_ARGUMENT);
   CHECK(bs_joint_states(w, 1, a.data(), nullptr, LINKS) == BS_ERROR_ARGUMENT);
@@ -261,9 +258,8 @@ void misuse() {
   CHECK(bs_base_state(w, 1, nullptr, 13) == BS_ERROR_ARGUMENT && bs_base_state(nullptr, 1, a.data(), 13) == BS_ERROR_ARGUMENT);
   CHECK(bs_base_state_set(w, 1, nullptr, 13) == BS_ERROR_ARGUMENT);
   CHECK(bs_base_state_set(w, 1, a.data(), 13) == BS_ERROR_ARGUMENT);  // a quaternion of zeros
-  CHECK(bs_link_states(w, 1, nullptr, 15 * LINKS) == BS_ERROR_ARGUMENT);
-  CHECK(bs_link_states(nullptr, 1, a.data(), 15 * LINKS) == BS_ERROR_ARGUMENT);
-  CHECK(bs_link_angular_velocities(w, 1, nullptr, 3 * LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_link_states(w, 1, nullptr, 18 * LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_link_states(nullptr, 1, a.data(), 18 * LINKS) == BS_ERROR_ARGUMENT);
   CHECK(bs_velocity_clamp(w, 1, nullptr, a.data()) == BS_ERROR_ARGUMENT);
   CHECK(bs_velocity_clamp(w, 1, a.data(), nullptr) == BS_ERROR_ARGUMENT);
   CHECK(bs_contacts(nullptr, nullptr, 0, &size) == BS_ERROR_ARGUMENT && bs_contacts(w, nullptr, 0, nullptr) == BS_ERROR_ARGUMENT);

@@ -363,24 +363,16 @@ impl World {
     pub fn link_states(&mut self, body: BodyId, links: &mut Vec<LinkState>) -> Result<(), BulletError> {
         let count = self.links_of(body)?;
         self.scratch.resize(18 * count, 0.0);
-        let (poses, rates) = self.scratch.split_at_mut(15 * count);
-        let pointer = self.raw.0.as_ptr();
-        // SAFETY: `poses` holds 15 and `rates` 3 values per link of this body, which is what the calls write.
-        let codes = unsafe {
-            [
-                sys::bs_link_states(pointer, body.index, poses.as_mut_ptr(), index(poses.len())?),
-                sys::bs_link_angular_velocities(pointer, body.index, rates.as_mut_ptr(), index(rates.len())?),
-            ]
-        };
-        for code in codes {
-            outcome(code, || "link states".into())?;
-        }
+        let length = index(self.scratch.len())?;
+        // SAFETY: the buffer holds 18 values per link of this body, which is what the call writes.
+        let code = unsafe { sys::bs_link_states(self.raw.0.as_ptr(), body.index, self.scratch.as_mut_ptr(), length) };
+        outcome(code, || "link states".into())?;
         links.clear();
-        links.extend(poses.chunks_exact(15).zip(rates.chunks_exact(3)).map(|(p, r)| LinkState {
-            position: [p[0], p[1], p[2]],
-            rotation: [[p[3], p[4], p[5]], [p[6], p[7], p[8]], [p[9], p[10], p[11]]],
-            velocity: [p[12], p[13], p[14]],
-            angular_velocity: [r[0], r[1], r[2]],
+        links.extend(self.scratch.chunks_exact(18).map(|s| LinkState {
+            position: [s[0], s[1], s[2]],
+            rotation: [[s[3], s[4], s[5]], [s[6], s[7], s[8]], [s[9], s[10], s[11]]],
+            velocity: [s[12], s[13], s[14]],
+            angular_velocity: [s[15], s[16], s[17]],
         }));
         Ok(())
     }
