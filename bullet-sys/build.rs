@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// The only Bullet that the shim is written for: snapshots reach into its data structures.
 const BULLET_VERSION: &str = "3.24";
 const DEBIAN_PACKAGE: &str = "libbullet-dev";
-const SOURCES: [&str; 4] = ["world.cpp", "multibody.cpp", "contact.cpp", "snapshot.cpp"];
+const SOURCES: [&str; 5] = ["world.cpp", "multibody.cpp", "contact.cpp", "snapshot.cpp", "solver.cpp"];
 
 fn main() {
     let bullet = find_bullet();
@@ -59,7 +59,7 @@ fn compile_shim(bullet: &pkg_config::Library) {
         println!("cargo::rerun-if-changed={path}");
         build.file(path);
     }
-    for header in ["shim/bullet_shim.h", "shim/internal.h", "shim/snapshot_state.h"] {
+    for header in ["shim/bullet_shim.h", "shim/internal.h", "shim/snapshot_state.h", "shim/solver.h"] {
         println!("cargo::rerun-if-changed={header}");
     }
     build.compile("bullet_shim");

@@ -14,12 +14,12 @@
 #include "BulletCollision/CollisionShapes/btBoxShape.h"
 #include "BulletCollision/CollisionShapes/btCompoundShape.h"
 #include "BulletDynamics/Featherstone/btMultiBody.h"
-#include "BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h"
 #include "BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h"
 #include "BulletDynamics/Featherstone/btMultiBodyFixedConstraint.h"
 #include "BulletDynamics/Featherstone/btMultiBodyLinkCollider.h"
 
 #include "bullet_shim.h"
+#include "solver.h"
 
 static_assert(sizeof(btScalar) == sizeof(double), "the shim needs Bullet's double-precision headers: define BT_USE_DOUBLE_PRECISION");
 static_assert(sizeof(btVector3) == 4 * sizeof(double), "btVector3 is four doubles in a double-precision build");
@@ -100,7 +100,7 @@ struct bs_world {
   bs::Dispatcher dispatcher;
   btHashedOverlappingPairCache pair_cache;
   btDbvtBroadphase broadphase;
-  btMultiBodyConstraintSolver solver;
+  bs::Solver solver;
   btMultiBodyDynamicsWorld dynamics;
   std::vector<bs::Body> bodies;
   std::vector<std::unique_ptr<btMultiBodyConstraint>> constraints;
