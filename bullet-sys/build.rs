@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 /// The only Bullet that the shim is written for: snapshots reach into its data structures.
 const BULLET_VERSION: &str = "3.24";
 const DEBIAN_PACKAGE: &str = "libbullet-dev";
-const SOURCES: [&str; 5] = ["world.cpp", "multibody.cpp", "contact.cpp", "snapshot.cpp", "solver.cpp"];
+const SOURCES: [&str; 7] = ["world.cpp", "multibody.cpp", "contact.cpp", "snapshot.cpp", "chain.cpp", "fixed.cpp", "solver.cpp"];
+const HEADERS: [&str; 6] = ["bullet_shim.h", "internal.h", "snapshot_state.h", "chain.h", "fixed.h", "solver.h"];
 
 fn main() {
     let bullet = find_bullet();
@@ -59,8 +60,8 @@ fn compile_shim(bullet: &pkg_config::Library) {
         println!("cargo::rerun-if-changed={path}");
         build.file(path);
     }
-    for header in ["shim/bullet_shim.h", "shim/internal.h", "shim/snapshot_state.h", "shim/solver.h"] {
-        println!("cargo::rerun-if-changed={header}");
+    for header in HEADERS {
+        println!("cargo::rerun-if-changed=shim/{header}");
     }
     build.compile("bullet_shim");
     // After the shim, which refers to them.

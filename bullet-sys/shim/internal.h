@@ -15,10 +15,10 @@
 #include "BulletCollision/CollisionShapes/btCompoundShape.h"
 #include "BulletDynamics/Featherstone/btMultiBody.h"
 #include "BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h"
-#include "BulletDynamics/Featherstone/btMultiBodyFixedConstraint.h"
 #include "BulletDynamics/Featherstone/btMultiBodyLinkCollider.h"
 
 #include "bullet_shim.h"
+#include "fixed.h"
 #include "solver.h"
 
 static_assert(sizeof(btScalar) == sizeof(double), "the shim needs Bullet's double-precision headers: define BT_USE_DOUBLE_PRECISION");

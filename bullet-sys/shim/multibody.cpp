@@ -168,10 +168,7 @@ int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impuls
     require(world != nullptr, "null pointer");
     require(max_impulse > 0, "the largest impulse must be positive");
     btMultiBody &multibody = world->multibody(body);
-    const btTransform base = multibody.getBaseWorldTransform();
-    btRigidBody *no_rigid_body = nullptr;
-    auto constraint = std::make_unique<btMultiBodyFixedConstraint>(&multibody, -1, no_rigid_body, btVector3(0, 0, 0), base.getOrigin(),
-                                                                   btMatrix3x3::getIdentity(), base.getBasis());
+    auto constraint = std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform());
     constraint->setMaxAppliedImpulse(max_impulse);
     world->constraints.push_back(std::move(constraint));
     world->dynamics.addMultiBodyConstraint(world->constraints.back().get());

@@ -1,0 +1,77 @@
+#include "fixed.h"
+
+#include "BulletDynamics/ConstraintSolver/btGeneric6DofSpring2Constraint.h"
+
+namespace bs {
+
+static constexpr int ROWS = 6;
+static constexpr int BASE = -1;
+
+FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world)
+    : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), btVector3(0, 0, 0), world.getOrigin(),
+                                 btMatrix3x3::getIdentity(), world.getBasis()) {}
+
+void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
+                                           const btContactSolverInfo &info) {
+  btMultiBody *body = m_bodyA;
+  if (!chain_.read(*body)) return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
+
+  const int freedoms = body->getNumDofs() + 6;
+  if (body->getCompanionId() < 0) {
+    body->setCompanionId(data.m_deltaVelocities.size());
+    data.m_deltaVelocities.resize(data.m_deltaVelocities.size() + freedoms);
+  }
+  const int first = data.m_jacobians.size();
+  data.m_jacobians.resizeNoInitialize(first + ROWS * freedoms);
+  data.m_deltaVelocitiesUnitImpulse.resizeNoInitialize(first + ROWS * freedoms);
+
+  const btVector3 zero(0, 0, 0);
+  const btVector3 pivot = body->localPosToWorld(BASE, m_pivotInA);
+  const btMatrix3x3 frame = body->localFrameToWorld(BASE, m_frameInA);
+  const btVector3 offset = pivot - m_pivotInB;
+  btVector3 turned;
+  btGeneric6DofSpring2Constraint::matrixToEulerXYZ(frame.inverse() * m_frameInB, turned);
+
+  Chain::Row responses[ROWS];
+  for (int i = 0; i < ROWS; ++i) {
+    Chain::Row &row = responses[i];
+    row.point = pivot;
+    row.linear = row.angular = zero;
+    if (i < 3) {
+      row.linear[i] = 1;
+    } else {
+      row.angular = frame.getColumn(i % 3);
+    }
+    row.jacobian = &data.m_jacobians[first + i * freedoms];
+    row.response = &data.m_deltaVelocitiesUnitImpulse[first + i * freedoms];
+    row.velocity = 0;
+  }
+  chain_.respond(BASE, responses, ROWS);
+
+  for (int i = 0; i < ROWS; ++i) {
+    const Chain::Row &row = responses[i];
+    btMultiBodySolverConstraint &out = rows.expandNonInitializing();
+    out.m_orgConstraint = this;
+    out.m_orgDofIndex = i;
+    out.m_multiBodyA = body;
+    out.m_multiBodyB = nullptr;
+    out.m_linkA = m_linkA;
+    out.m_linkB = m_linkB;
+    out.m_solverBodyIdA = out.m_solverBodyIdB = data.m_fixedBodyId;
+    out.m_deltaVelAindex = body->getCompanionId();
+    out.m_jacAindex = first + i * freedoms;
+    out.m_relpos1CrossNormal = i < 3 ? (pivot - body->getBasePos()).cross(row.linear) : row.angular;
+    out.m_contactNormal1 = row.linear;
+    // The world does not answer, so its side stays empty.
+    out.m_relpos2CrossNormal = out.m_contactNormal2 = out.m_angularComponentA = out.m_angularComponentB = zero;
+    out.m_jacDiagABInv = row.inverse_mass > SIMD_EPSILON ? btScalar(1) / row.inverse_mass : btScalar(0);
+    const btScalar error = i < 3 ? offset.dot(row.linear) : turned[i % 3];
+    const btScalar position = -error * info.m_erp / info.m_timeStep, velocity = -row.velocity;
+    out.m_rhs = position * out.m_jacDiagABInv + velocity * out.m_jacDiagABInv;
+    out.m_rhsPenetration = out.m_cfm = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
+    out.m_lowerLimit = -m_maxAppliedImpulse;
+    out.m_upperLimit = m_maxAppliedImpulse;
+  }
+}
+
+}  // namespace bs
