@@ -1,9 +1,9 @@
 //! The reference's robot on Bullet, bit for bit.
 
-use super::{ClampHits, Engine, EngineError, JointState};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
-use crate::bullet::{BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World};
+use crate::bullet::{self, BaseState, BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World};
 use crate::model::{Mount, Robot};
 
 /// Collision margin of every box (cm), as PyBullet sets it for bodies built by its calls.
@@ -28,6 +28,7 @@ pub struct BulletEngine {
     step: u64,
     state: JointState,
     links: Vec<LinkState>,
+    touching: Vec<bullet::Contact>,
     clamp_hits: Option<ClampHits>,
 }
 
@@ -74,6 +75,7 @@ impl BulletEngine {
             step: 0,
             state: JointState { angles: zeros(), rates: zeros(), torques: zeros(), motor_voltages: zeros() },
             links: Vec::with_capacity(joints),
+            touching: Vec::new(),
             clamp_hits: None,
         })
     }
@@ -157,6 +159,12 @@ fn pitch([x, y, z]: [f64; 3]) -> f64 {
     (-z).atan2(x.hypot(y).copysign(x))
 }
 
+/// Pitch of the base, from the first column of its rotation: its x axis in the world.
+fn base_pitch(base: &BaseState) -> f64 {
+    let [qx, qy, qz, qw] = base.orientation;
+    pitch([1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz), 2.0 * (qx * qz - qw * qy)])
+}
+
 impl Engine for BulletEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
         let JointState { angles, rates, torques, motor_voltages } = &mut self.state;
@@ -191,9 +199,7 @@ impl Engine for BulletEngine {
         self.world.link_states(self.body, &mut self.links)?;
         let half = self.half_link_length;
 
-        // First column of the base's rotation: its x axis in the world.
-        let [qx, qy, qz, qw] = base.orientation;
-        let p = pitch([1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz), 2.0 * (qx * qz - qw * qy)]);
+        let p = base_pitch(&base);
         let lever = half / 2.0;
         let rate = base.angular_velocity[1];
         positions[..3].copy_from_slice(&[base.position[0] - lever * p.cos(), 0.0, base.position[2] + lever * p.sin()]);
@@ -224,6 +230,37 @@ impl Engine for BulletEngine {
             0.0,
             last.velocity[2] - half * p.cos() * rate,
         ]);
+        Ok(())
+    }
+
+    fn base(&self) -> Result<PlanarBase, EngineError> {
+        let base = self.world.base_state(self.body)?;
+        let plane = |v: [f64; 3]| [v[0], v[2]];
+        Ok(PlanarBase {
+            position: plane(base.position),
+            pitch: base_pitch(&base),
+            velocity: plane(base.velocity),
+            pitch_rate: base.angular_velocity[1],
+        })
+    }
+
+    fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
+        self.world.contacts(&mut self.touching)?;
+        contacts.clear();
+        contacts.extend(self.touching.iter().filter(|c| c.normal_impulse != 0.0).map(|c| {
+            // Impulses are those on the first body.
+            let (sign, link) = if c.a.0 == self.body { (1.0, c.a.1) } else { (-1.0, c.b.1) };
+            let along = |axis: usize| {
+                let friction = c.friction_impulse[0] * c.friction_directions[0][axis]
+                    + c.friction_impulse[1] * c.friction_directions[1][axis];
+                sign * (c.normal_impulse * c.normal[axis] + friction) / self.time_step
+            };
+            Contact {
+                link: link.map_or(0, |link| link + 1),
+                position: [c.position[0], c.position[2]],
+                force: [along(0), along(2)],
+            }
+        }));
         Ok(())
     }
 

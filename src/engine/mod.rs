@@ -5,8 +5,10 @@
 //! observed. The loop over steps lives in [`experiment::run`](crate::experiment::run).
 
 mod bullet;
+mod energy;
 
 pub use bullet::BulletEngine;
+pub use energy::{Books, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
 
 use thiserror::Error;
 
@@ -63,6 +65,17 @@ pub struct ClampHits {
     pub limit: f64,
 }
 
+/// A force of the floor on a link during the last step, in the plane of motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// The link, from 0 for the body at the left end.
+    pub link: usize,
+    /// Where it acts: x and z (cm).
+    pub position: [f64; 2],
+    /// Along x (friction) and z (normal) (dyn), the mean over the step.
+    pub force: [f64; 2],
+}
+
 /// A robot that can be stepped.
 pub trait Engine {
     /// Reads the joints and computes their torques for the given voltages (V), one per actuator.
@@ -79,6 +92,18 @@ pub trait Engine {
     /// # Errors
     /// [`EngineError::NotFinite`] if the base's position is not a number.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError>;
+
+    /// Pose and velocity of the base in the plane of motion.
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn base(&self) -> Result<PlanarBase, EngineError>;
+
+    /// Reads the forces of the floor into `contacts`, which is cleared first.
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError>;
 
     /// Applies the torques and steps by the engine's time step.
     ///

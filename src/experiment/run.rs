@@ -1,7 +1,7 @@
 //! The loop over steps.
 
 use super::Experiment;
-use crate::engine::{ClampHits, Engine, EngineError};
+use crate::engine::{Books, ClampHits, Engine, EnergyBalance, EngineError};
 use crate::recording::Recording;
 
 /// Steps between two calls of the observer: often enough for a progress bar, too rare to cost anything.
@@ -25,6 +25,8 @@ pub struct Run {
     pub interrupted: bool,
     /// Whether the engine had to limit velocities.
     pub clamp_hits: Option<ClampHits>,
+    /// Where energy came from and where it went.
+    pub energy: EnergyBalance,
 }
 
 /// Runs an experiment on an engine of its robot. `observe` is called every 256 steps with the number of steps done.
@@ -41,6 +43,7 @@ pub fn run(
     mut observe: impl FnMut(u64) -> Control,
 ) -> Result<Run, EngineError> {
     let mut recorder = Recorder::new(experiment);
+    let mut books = Books::new(&experiment.robot, experiment.time_step);
     let mut voltages = vec![0.0; experiment.robot.actuators];
     let mut time = 0.0;
     let mut interrupted = false;
@@ -53,6 +56,7 @@ pub fn run(
         experiment.drive.voltages(time, &mut voltages);
         time = done as f64 * experiment.time_step;
         engine.prepare(&voltages)?;
+        books.take(engine)?;
         if experiment.records(done) {
             recorder.record(time, engine)?;
         }
@@ -61,7 +65,7 @@ pub fn run(
     }
     let mut recording = recorder.recording;
     recording.meta = experiment.meta(done, String::new());
-    Ok(Run { recording, interrupted, clamp_hits: engine.clamp_hits() })
+    Ok(Run { recording, interrupted, clamp_hits: engine.clamp_hits(), energy: books.balance() })
 }
 
 /// A recording that grows in memory set aside for it.

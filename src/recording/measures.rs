@@ -3,81 +3,261 @@
 use serde::Serialize;
 
 use super::Recording;
+use super::signal::{Harmonic, Mode, phase_difference_deg, repetition};
 use crate::model::Mount;
 use crate::model::units::mm_from_cm;
 
+/// Clearance (cm) below which a node touches the floor: a tenth of the collision box's thickness or so, and far above the penetration
+/// of resting contact (measured: 10⁻⁴ cm).
+const TOUCHING: f64 = 0.005;
+/// Largest [`repetition`] that still counts as the same motion. Measured at 14 Hz: 0.01 to 0.1 after two periods, 0.6 after one.
+const SAME: f64 = 0.2;
+
 /// Measures of one run; those that make no sense for its mount or drive are absent.
+///
+/// "The last period" is the last whole period of the drive; the last half of the run, in whole periods, is taken for what needs a settled
+/// state. x and z are those of the nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Measures {
     /// Height of the right end above the flat robot in the last record (mm): z of the last node. Clamped robots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_deflection_mm: Option<f64>,
-    /// Half the difference between the largest and smallest height of the right end over the last whole period of the drive, or over
-    /// the whole run if the drive has none (mm). Clamped robots.
+    /// Half the difference between the largest and smallest height of the right end over the last period, or over the whole run if the
+    /// drive has none (mm). Clamped robots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_amplitude_mm: Option<f64>,
+    /// Phase of the right end's height against the voltage of the first actuator, both at the drive's frequency over the last half of
+    /// the run (deg): 0 for slow drives, negative for a lag. Clamped robots with a period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tip_phase_deg: Option<f64>,
+    /// Frequency of the largest response (Hz), from how the right end rings: see [`Mode::of_ringing`]. Clamped robots whose voltage does
+    /// not repeat.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resonance_hz: Option<f64>,
+    /// Damping ratio of that mode (–).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping_ratio: Option<f64>,
+    /// Width of its peak at 1/√2 of the height (Hz).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub half_power_bandwidth_hz: Option<f64>,
     /// Height of the lowest point at its best: max over time of min over nodes of z (mm). Robots that are not clamped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jump_height_mm: Option<f64>,
-    /// Travel of the nodes' mean x during the last whole period (mm). Robots that are not clamped, with a period.
+    /// Travel of the nodes' mean x during the last period (mm). Robots that are not clamped, with a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stride_mm: Option<f64>,
-    /// Mean speed of the nodes' mean x: the stride over its period, or the whole travel over the whole time if the drive has no
+    /// Mean speed of the nodes' mean x over the last half of the run in whole periods, or over the whole run if the drive has no
     /// period (mm/s). Robots that are not clamped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speed_mm_s: Option<f64>,
+    /// Max over time of the left end's plus the right end's travel along x (mm). Robots that are not clamped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub displacement_sum_mm: Option<f64>,
+    /// Periods of the drive after which the nodes' heights repeat, by [`repetition`] below 0.2 over the last half of the run in pairs of
+    /// periods: 1, 2, or 0 for neither (–). Robots that are not clamped, with a period, in runs of six periods or more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_ratio: Option<f64>,
+    /// Phase of the middle node's height against the mean height of both ends, at the drive's frequency over the last half of the run
+    /// (deg). Robots that are not clamped, with a period.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mid_end_phase_deg: Option<f64>,
+    /// Share of the time that a node other than the ends touches the floor (–): see [`contact_states`]. Robots on the ground.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_touching: Option<f64>,
+    /// Share of the time that only the ends touch (–).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_touching: Option<f64>,
+    /// Share of the time that nothing touches (–).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aerial: Option<f64>,
+    /// Energy that nothing supplied, as a fraction of the largest mechanical energy (–): see
+    /// [`EnergyBalance`](crate::engine::EnergyBalance). Known to the run, not to the recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy_error: Option<f64>,
+}
+
+/// How a robot touches the floor at one time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ContactState {
+    /// A node other than the two at each end touches.
+    BodyTouching,
+    /// Only the ends touch: the last node or the joint next to it.
+    EndTouching,
+    /// Nothing touches.
+    Aerial,
+}
+
+/// How the robot touches the floor in each record. A node touches if it is less than 0.05 mm above its height on the flat robot.
+pub fn contact_states(recording: &Recording) -> Vec<ContactState> {
+    let nodes = recording.nodes();
+    let touches = |record: usize, node: usize| recording.node(record, node)[2] < TOUCHING;
+    (0..recording.len())
+        .map(|record| {
+            if (2..nodes.saturating_sub(2)).any(|node| touches(record, node)) {
+                ContactState::BodyTouching
+            } else if (0..nodes).any(|node| touches(record, node)) {
+                ContactState::EndTouching
+            } else {
+                ContactState::Aerial
+            }
+        })
+        .collect()
 }
 
 impl Measures {
     /// Takes the measures of `recording`. `period` (s) is the drive's, if it repeats.
     pub fn of(recording: &Recording, mount: Mount, period: Option<f64>) -> Self {
-        let (Some(&first_time), Some(&last_time)) = (recording.time.first(), recording.time.last()) else {
+        if recording.len() < 2 {
             return Self::default();
-        };
-        let last = recording.len() - 1;
-        // Index of the record nearest to one period before the end, if the run is that long.
-        let period_start = period
-            .filter(|&period| period > 0.0 && last_time - period >= first_time - 1e-9 * period)
-            .map(|period| nearest(&recording.time, last_time - period))
-            .filter(|&start| start < last);
-        let mut measures = Self::default();
-        if mount == Mount::Clamped {
-            let tip = |record: usize| mm_from_cm(recording.node(record, recording.nodes() - 1)[2]);
-            let window = period_start.unwrap_or(0)..=last;
-            let (low, high) =
-                window.map(tip).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
-            measures.tip_deflection_mm = Some(tip(last));
-            measures.tip_amplitude_mm = Some((high - low) / 2.0);
-            return measures;
         }
-        let lowest =
-            |record: usize| (0..recording.nodes()).map(|node| recording.node(record, node)[2]).fold(f64::INFINITY, f64::min);
-        let mean_x = |record: usize| {
-            (0..recording.nodes()).map(|node| recording.node(record, node)[0]).sum::<f64>() / recording.nodes() as f64
+        let period = period.filter(|&period| period > 0.0);
+        match mount {
+            Mount::Clamped => Self::of_clamped(recording, period),
+            Mount::Ground | Mount::Free => Self::of_mobile(recording, period, mount == Mount::Ground),
+        }
+    }
+
+    fn of_clamped(recording: &Recording, period: Option<f64>) -> Self {
+        let tip: Vec<f64> = (0..recording.len()).map(|record| z_mm(recording, record, recording.nodes() - 1)).collect();
+        let last = tip.len() - 1;
+        let from = period.and_then(|period| periods_before_end(recording, period, 1)).unwrap_or(0);
+        let (low, high) = tip[from..].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
+        let mut measures = Self {
+            tip_deflection_mm: Some(tip[last]),
+            tip_amplitude_mm: Some((high - low) / 2.0),
+            ..Self::default()
         };
+        if let Some(period) = period {
+            let volts: Vec<f64> = recording.motor_voltages.iter().step_by(recording.joints()).copied().collect();
+            measures.tip_phase_deg = phase_between(recording, &tip, &volts, period);
+        } else if let Some(mode) = Mode::of_ringing(&recording.time, &tip) {
+            measures.resonance_hz = Some(mode.resonance_hz);
+            measures.damping_ratio = Some(mode.damping_ratio);
+            measures.half_power_bandwidth_hz = Some(mode.half_power_bandwidth_hz);
+        }
+        measures
+    }
+
+    fn of_mobile(recording: &Recording, period: Option<f64>, ground: bool) -> Self {
+        let (records, nodes) = (recording.len(), recording.nodes());
+        let last = records - 1;
+        let lowest = |record: usize| (0..nodes).map(|node| z_mm(recording, record, node)).fold(f64::INFINITY, f64::min);
+        let mean_x = |record: usize| (0..nodes).map(|node| recording.node(record, node)[0]).sum::<f64>() / nodes as f64;
         let travel = |from: usize| mm_from_cm(mean_x(last) - mean_x(from));
-        measures.jump_height_mm = Some(mm_from_cm((0..=last).map(lowest).fold(f64::NEG_INFINITY, f64::max)));
-        measures.stride_mm = period_start.map(travel);
-        let from = period_start.unwrap_or(0);
-        if last_time > recording.time[from] {
-            measures.speed_mm_s = Some(travel(from) / (last_time - recording.time[from]));
+        let ends_x = |record: usize| recording.node(record, 0)[0] + recording.node(record, nodes - 1)[0];
+        let mut measures = Self {
+            jump_height_mm: Some((0..records).map(lowest).fold(f64::NEG_INFINITY, f64::max)),
+            displacement_sum_mm: Some((0..records).map(|r| mm_from_cm(ends_x(r) - ends_x(0))).fold(f64::NEG_INFINITY, f64::max)),
+            ..Self::default()
+        };
+        let from = match period {
+            Some(period) => half_run(recording, period),
+            None => Some(0),
+        };
+        measures.speed_mm_s =
+            from.map(|from| travel(from) / (recording.time[last] - recording.time[from])).filter(|speed| speed.is_finite());
+        if let Some(period) = period {
+            measures.stride_mm = periods_before_end(recording, period, 1).map(travel);
+            measures.period_ratio = period_ratio(recording, period);
+            let height = |node: usize| (0..records).map(|r| z_mm(recording, r, node)).collect::<Vec<_>>();
+            // Of an even number of nodes the two in the middle stand for it.
+            let mean = |a: usize, b: usize| height(a).iter().zip(height(b)).map(|(a, b)| (a + b) / 2.0).collect::<Vec<_>>();
+            measures.mid_end_phase_deg =
+                phase_between(recording, &mean((nodes - 1) / 2, nodes / 2), &mean(0, nodes - 1), period);
+        }
+        if ground {
+            let states = contact_states(recording);
+            let share = |state| states.iter().filter(|&&s| s == state).count() as f64 / records as f64;
+            measures.body_touching = Some(share(ContactState::BodyTouching));
+            measures.end_touching = Some(share(ContactState::EndTouching));
+            measures.aerial = Some(share(ContactState::Aerial));
         }
         measures
     }
 
     /// Name and value of every measure that is present.
-    pub fn named(&self) -> Vec<(&'static str, f64)> {
-        [
-            ("tip_deflection_mm", self.tip_deflection_mm),
-            ("tip_amplitude_mm", self.tip_amplitude_mm),
-            ("jump_height_mm", self.jump_height_mm),
-            ("stride_mm", self.stride_mm),
-            ("speed_mm_s", self.speed_mm_s),
-        ]
-        .into_iter()
-        .filter_map(|(name, value)| Some((name, value?)))
-        .collect()
+    pub fn named(&self) -> Vec<(String, f64)> {
+        let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(self) else { return Vec::new() };
+        fields.into_iter().filter_map(|(name, value)| Some((name, value.as_f64()?))).collect()
     }
+
+    /// The value of one measure, if it is present.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.named().into_iter().find(|(found, _)| found == name).map(|(_, value)| value)
+    }
+
+    /// The names of all measures.
+    pub fn names() -> Vec<String> {
+        let full = Self {
+            tip_deflection_mm: Some(0.0),
+            tip_amplitude_mm: Some(0.0),
+            tip_phase_deg: Some(0.0),
+            resonance_hz: Some(0.0),
+            damping_ratio: Some(0.0),
+            half_power_bandwidth_hz: Some(0.0),
+            jump_height_mm: Some(0.0),
+            stride_mm: Some(0.0),
+            speed_mm_s: Some(0.0),
+            displacement_sum_mm: Some(0.0),
+            period_ratio: Some(0.0),
+            mid_end_phase_deg: Some(0.0),
+            body_touching: Some(0.0),
+            end_touching: Some(0.0),
+            aerial: Some(0.0),
+            energy_error: Some(0.0),
+        };
+        full.named().into_iter().map(|(name, _)| name).collect()
+    }
+}
+
+fn z_mm(recording: &Recording, record: usize, node: usize) -> f64 {
+    mm_from_cm(recording.node(record, node)[2])
+}
+
+/// The record nearest to `count` periods before the end, if the run is that long.
+fn periods_before_end(recording: &Recording, period: f64, count: usize) -> Option<usize> {
+    let last = recording.len() - 1;
+    let start = recording.time[last] - period * count as f64;
+    if start < recording.time[0] - 1e-9 * period {
+        return None;
+    }
+    Some(nearest(&recording.time, start)).filter(|&from| from < last)
+}
+
+/// The record that begins the last half of the run in whole periods, at least one.
+fn half_run(recording: &Recording, period: f64) -> Option<usize> {
+    let duration = recording.time[recording.len() - 1] - recording.time[0];
+    periods_before_end(recording, period, ((duration / 2.0 / period).floor() as usize).max(1))
+}
+
+/// Phase (deg) of one signal against another at the drive's frequency; absent where either does not move at it.
+fn phase_between(recording: &Recording, signal: &[f64], against: &[f64], period: f64) -> Option<f64> {
+    let from = half_run(recording, period)?;
+    let fit = |values: &[f64]| {
+        let spread = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        Harmonic::fit(&recording.time[from..], &values[from..], 1.0 / period).filter(|fit| fit.amplitude() > 1e-9 * spread)
+    };
+    Some(phase_difference_deg(fit(signal)?.phase_deg(), fit(against)?.phase_deg()))
+}
+
+fn period_ratio(recording: &Recording, period: f64) -> Option<f64> {
+    let duration = recording.time[recording.len() - 1] - recording.time[0];
+    let pairs = (duration / 4.0 / period).floor();
+    // At 12 periods the last six are compared with the six that began one or two periods before.
+    let window = 2.0 * period * pairs;
+    if pairs < 1.0 || window + 2.0 * period > duration * (1.0 + 1e-9) {
+        return None;
+    }
+    let heights: Vec<Vec<f64>> =
+        (0..recording.len()).map(|r| (0..recording.nodes()).map(|node| z_mm(recording, r, node)).collect()).collect();
+    let same = |shift: f64| repetition(&recording.time, &heights, shift, window).is_some_and(|r| r < SAME);
+    Some(if same(period) {
+        1.0
+    } else if same(2.0 * period) {
+        2.0
+    } else {
+        0.0
+    })
 }
 
 fn nearest(times: &[f64], t: f64) -> usize {
@@ -92,17 +272,18 @@ fn nearest(times: &[f64], t: f64) -> usize {
 mod tests {
     use super::super::Meta;
     use super::*;
+    use std::f64::consts::PI;
 
-    /// Three nodes (two would be a robot without joints), the middle one at the mean of the ends.
-    fn recording(times: &[f64], left: impl Fn(f64) -> (f64, f64), right: impl Fn(f64) -> (f64, f64)) -> Recording {
+    /// A robot of one actuator with `m` joints whose nodes move as `(x, z)` (cm) of node and time, on 1 V − cos.
+    fn recording(times: &[f64], m: usize, frequency: f64, node: impl Fn(usize, f64) -> (f64, f64)) -> Recording {
         let mut recording = Recording {
-            meta: Meta { actuators: 1, motors_per_actuator: 1, ..Meta::default() },
+            meta: Meta { actuators: 1, motors_per_actuator: m, ..Meta::default() },
             time: times.to_vec(),
             ..Recording::default()
         };
         for &t in times {
-            let ((xl, zl), (xr, zr)) = (left(t), right(t));
-            recording.positions.extend([xl, 0.0, zl, (xl + xr) / 2.0, 0.0, (zl + zr) / 2.0, xr, 0.0, zr]);
+            recording.positions.extend((0..m + 2).map(|i| node(i, t)).flat_map(|(x, z)| [x, 0.0, z]));
+            recording.motor_voltages.extend(vec![-(1.0 - (2.0 * PI * frequency * t).cos()); m]);
         }
         recording
     }
@@ -112,32 +293,85 @@ mod tests {
     }
 
     #[test]
-    fn a_tip_that_swings_has_its_amplitude_and_last_deflection() {
-        let tip = |t: f64| (10.0, -0.5 + 0.2 * (2.0 * std::f64::consts::PI * 2.0 * t).sin());
-        let measures = Measures::of(&recording(&times(), |_| (0.0, 0.0), tip), Mount::Clamped, Some(0.5));
-        assert!((measures.tip_amplitude_mm.unwrap() - 2.0).abs() < 1e-9);
-        assert!((measures.tip_deflection_mm.unwrap() + 5.0).abs() < 1e-9);
-        assert_eq!(measures.jump_height_mm, None);
+    fn a_tip_that_swings_has_its_amplitude_last_deflection_and_phase() {
+        // The voltage is −1 + cos: its harmonic leads with phase 0, the tip's lags by 0.9 rad.
+        let tip = |i: usize, t: f64| (0.0, if i == 2 { -0.5 + 0.2 * (2.0 * PI * 2.0 * t - 0.9).cos() } else { 0.0 });
+        let measures = Measures::of(&recording(&times(), 1, 2.0, tip), Mount::Clamped, Some(0.5));
+        // Half the sampling step away from the extreme: 2 mm (ωΔt/2)²/2.
+        assert!((measures.tip_amplitude_mm.unwrap() - 2.0).abs() < 1e-4);
+        assert!((measures.tip_deflection_mm.unwrap() - (-5.0 + 2.0 * 0.9_f64.cos())).abs() < 1e-9);
+        assert!((measures.tip_phase_deg.unwrap() + 0.9_f64.to_degrees()).abs() < 1e-9);
+        assert_eq!((measures.jump_height_mm, measures.resonance_hz), (None, None));
+    }
+
+    #[test]
+    fn a_tip_that_rings_has_a_resonance() {
+        let tip = |i: usize, t: f64| (0.0, if i == 2 { -1.0 + (-4.0 * t).exp() * (2.0 * PI * 10.0 * t).cos() } else { 0.0 });
+        let measures = Measures::of(&recording(&times(), 1, 1.0, tip), Mount::Clamped, None);
+        let zeta = 4.0 / (4.0_f64.powi(2) + (2.0 * PI * 10.0).powi(2)).sqrt();
+        assert!((measures.damping_ratio.unwrap() / zeta - 1.0).abs() < 2e-3);
+        assert!((measures.resonance_hz.unwrap() - 10.0).abs() < 0.06);
+        assert_eq!(measures.tip_phase_deg, None);
     }
 
     #[test]
     fn a_robot_that_flies_and_drifts_has_height_stride_and_speed() {
         // Left end up to 3 mm, right end up to 4 mm, at the same time; 7 mm/s to the right.
         let hump = |t: f64| (1.0 - (2.0 * t - 1.0).powi(2)).max(0.0);
-        let robot = recording(&times(), |t| (0.7 * t, 0.3 * hump(t)), |t| (10.0 + 0.7 * t, 0.4 * hump(t)));
+        let node = |i: usize, t: f64| (5.0 * i as f64 + 0.7 * t, (0.3 + 0.05 * i as f64) * hump(t));
+        let robot = recording(&times(), 1, 4.0, node);
         let measures = Measures::of(&robot, Mount::Ground, Some(0.25));
         assert!((measures.jump_height_mm.unwrap() - 3.0).abs() < 1e-9);
         assert!((measures.stride_mm.unwrap() - 1.75).abs() < 1e-9);
         assert!((measures.speed_mm_s.unwrap() - 7.0).abs() < 1e-9);
+        assert!((measures.displacement_sum_mm.unwrap() - 28.0).abs() < 1e-9);
         let aperiodic = Measures::of(&robot, Mount::Ground, None);
         assert_eq!(aperiodic.stride_mm, None);
         assert!((aperiodic.speed_mm_s.unwrap() - 7.0).abs() < 1e-9);
+        // 0.05 mm is passed where 1 − (2t − 1)² = 0.005/0.3, at 0.42 % and 99.6 % of the first second; the next second it lies.
+        assert!((measures.aerial.unwrap() - 0.496).abs() < 2e-3, "{measures:?}");
+    }
+
+    #[test]
+    fn a_motion_of_twice_the_period_is_told_from_one_of_the_same_and_from_none() {
+        let with = |extra: fn(f64) -> f64| {
+            let node = move |i: usize, t: f64| {
+                let sign = if i == 2 || i == 3 { -1.0 } else { 1.0 };
+                (i as f64, 1.0 + sign * 0.1 * (2.0 * PI * 10.0 * t).cos() + 0.1 * extra(t))
+            };
+            Measures::of(&recording(&times(), 4, 10.0, node), Mount::Ground, Some(0.1))
+        };
+        let same = with(|_| 0.0);
+        assert_eq!(same.period_ratio, Some(1.0));
+        assert!((same.mid_end_phase_deg.unwrap().abs() - 180.0).abs() < 1e-6);
+        assert_eq!(with(|t| (2.0 * PI * 5.0 * t).cos()).period_ratio, Some(2.0));
+        assert_eq!(with(|t| (2.0 * PI * 7.1 * t).cos()).period_ratio, Some(0.0));
+    }
+
+    #[test]
+    fn contact_is_by_the_body_by_the_ends_or_not_at_all() {
+        let flat = |_: usize, _: f64| (0.0, 0.0);
+        let arch = |i: usize, _: f64| (0.0, if i == 0 || i == 7 { 0.0 } else { 1.0 });
+        let high = |_: usize, _: f64| (0.0, 1.0);
+        let state = |node: fn(usize, f64) -> (f64, f64)| contact_states(&recording(&[0.0, 1.0], 6, 1.0, node))[0];
+        assert_eq!(state(flat), ContactState::BodyTouching);
+        assert_eq!(state(arch), ContactState::EndTouching);
+        assert_eq!(state(high), ContactState::Aerial);
     }
 
     #[test]
     fn a_run_shorter_than_a_period_has_no_stride_and_an_empty_one_no_measures() {
-        let robot = recording(&times(), |_| (0.0, 0.0), |_| (1.0, 0.0));
-        assert_eq!(Measures::of(&robot, Mount::Ground, Some(3.0)).stride_mm, None);
+        let robot = recording(&times(), 1, 1.0, |i, _| (i as f64, 0.0));
+        let measures = Measures::of(&robot, Mount::Ground, Some(3.0));
+        assert_eq!((measures.stride_mm, measures.speed_mm_s), (None, None));
         assert_eq!(Measures::of(&Recording::default(), Mount::Ground, None), Measures::default());
+    }
+
+    #[test]
+    fn every_measure_can_be_asked_for_by_its_name() {
+        let names = Measures::names();
+        assert_eq!(names.len(), 16);
+        let measures = Measures { stride_mm: Some(2.5), ..Measures::default() };
+        assert_eq!((measures.get("stride_mm"), measures.get("aerial")), (Some(2.5), None));
     }
 }

@@ -3,6 +3,7 @@
 pub mod csv;
 pub mod measures;
 pub mod npz;
+pub mod signal;
 
 use std::path::PathBuf;
 

@@ -1,0 +1,266 @@
+//! Numbers out of signals: harmonics, ringing, resonance peaks, repetition.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// A sine at one frequency with a mean: x = mean + c cos ωt + s sin ωt, in the unit of the signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Harmonic {
+    /// Mean.
+    pub mean: f64,
+    /// c.
+    pub cos: f64,
+    /// s.
+    pub sin: f64,
+}
+
+impl Harmonic {
+    /// Fits one harmonic of `frequency` (Hz) by least squares; `None` if the samples cannot tell its three numbers apart.
+    pub fn fit(times: &[f64], values: &[f64], frequency: f64) -> Option<Self> {
+        if times.len() < 3 {
+            return None;
+        }
+        let mut normal = Matrix3::zeros();
+        let mut right = Vector3::zeros();
+        for (&t, &x) in times.iter().zip(values) {
+            let phase = 2.0 * std::f64::consts::PI * frequency * t;
+            let row = Vector3::new(1.0, phase.cos(), phase.sin());
+            normal += row * row.transpose();
+            right += row * x;
+        }
+        let p = normal.cholesky()?.solve(&right);
+        Some(Self { mean: p[0], cos: p[1], sin: p[2] })
+    }
+
+    /// Amplitude, √(c² + s²).
+    pub fn amplitude(&self) -> f64 {
+        self.cos.hypot(self.sin)
+    }
+
+    /// Phase (deg) of A cos(ωt + φ): between −180 and 180, negative for a lag.
+    pub fn phase_deg(&self) -> f64 {
+        (-self.sin).atan2(self.cos).to_degrees()
+    }
+}
+
+/// `a − b` in degrees, between −180 and 180.
+pub fn phase_difference_deg(a: f64, b: f64) -> f64 {
+    let difference = (a - b).rem_euclid(360.0);
+    if difference > 180.0 { difference - 360.0 } else { difference }
+}
+
+/// One mode of vibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mode {
+    /// Frequency at which a sine drives it furthest (Hz).
+    pub resonance_hz: f64,
+    /// Damping ratio ζ (–).
+    pub damping_ratio: f64,
+    /// Width of the peak at 1/√2 of its height (Hz).
+    pub half_power_bandwidth_hz: f64,
+}
+
+impl Mode {
+    /// A mode from the ringing that follows a step, by its turning points.
+    ///
+    /// ```text
+    /// ln(swing_i) = const − i δ,    ζ = δ/√(π² + δ²),    f_d = 1/(2 Δt),    f_n = f_d/√(1−ζ²),    f_r = f_n √(1 − 2ζ²)
+    /// ```
+    ///
+    /// δ: logarithmic decrement of half a period, Δt: mean time between turning points, both from a straight line through all swings above
+    /// 1 % of the first. Differences of neighbouring turning points do not depend on where the signal comes to rest. The width of the
+    /// peak is 2 ζ f_n, right for light damping. `None` if there are fewer than three swings or the mode is too damped to peak.
+    ///
+    /// # References
+    /// D. J. Inman, *Engineering Vibration*, sections 1.6 (logarithmic decrement) and 2.2 (resonance peak).
+    pub fn of_ringing(times: &[f64], values: &[f64]) -> Option<Self> {
+        let turns = turning_points(times, values);
+        let swings: Vec<f64> = turns.windows(2).map(|pair| (pair[1].1 - pair[0].1).abs()).collect();
+        let first = *swings.first()?;
+        let count = swings.iter().take_while(|&&swing| swing > 0.01 * first).count();
+        if count < 3 {
+            return None;
+        }
+        let logs: Vec<f64> = swings[..count].iter().map(|swing| swing.ln()).collect();
+        let when: Vec<f64> = turns[..=count].iter().map(|turn| turn.0).collect();
+        let decrement = -slope(&logs);
+        let damping_ratio = decrement / std::f64::consts::PI.hypot(decrement);
+        let natural = 1.0 / (2.0 * slope(&when)) / (1.0 - damping_ratio.powi(2)).sqrt();
+        let peak = 1.0 - 2.0 * damping_ratio.powi(2);
+        (peak > 0.0).then(|| Self {
+            resonance_hz: natural * peak.sqrt(),
+            damping_ratio,
+            half_power_bandwidth_hz: 2.0 * damping_ratio * natural,
+        })
+    }
+
+    /// A mode from a frequency response, `amplitudes` at rising `frequencies` (Hz): the top of the parabola through the largest amplitude
+    /// and its neighbours, the width where straight lines between the points cross 1/√2 of it, ζ = width/(2 f). `None` if the largest
+    /// amplitude stands at an end or the response does not fall far enough on both sides.
+    pub fn of_response(frequencies: &[f64], amplitudes: &[f64]) -> Option<Self> {
+        let top = (0..amplitudes.len()).max_by(|&a, &b| amplitudes[a].total_cmp(&amplitudes[b]))?;
+        if top == 0 || top + 1 >= amplitudes.len() {
+            return None;
+        }
+        let around = |values: &[f64]| [values[top - 1], values[top], values[top + 1]];
+        let (resonance_hz, height) = parabola_top(around(frequencies), around(amplitudes))?;
+        let half = height * std::f64::consts::FRAC_1_SQRT_2;
+        let cross = |below: usize, above: usize| {
+            let share = (half - amplitudes[below]) / (amplitudes[above] - amplitudes[below]);
+            frequencies[below] + share * (frequencies[above] - frequencies[below])
+        };
+        let left = (0..top).rev().find(|&i| amplitudes[i] < half).map(|i| cross(i, i + 1))?;
+        let right = (top + 1..amplitudes.len()).find(|&i| amplitudes[i] < half).map(|i| cross(i, i - 1))?;
+        Some(Self {
+            resonance_hz,
+            damping_ratio: (right - left) / (2.0 * resonance_hz),
+            half_power_bandwidth_hz: right - left,
+        })
+    }
+}
+
+/// Share of the last swing by which a signal must turn back for a turning point to count: passes over ripples of higher modes.
+const HYSTERESIS: f64 = 0.05;
+
+/// Time and value of the turning points of a signal, between samples by a parabola; the ends do not count.
+fn turning_points(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    let mut turns = Vec::new();
+    let Some(&start) = values.first() else { return turns };
+    let (mut best, mut direction, mut last) = (0, 0.0, start);
+    for i in 1..values.len() {
+        if direction == 0.0 {
+            direction = values[i] - start;
+        } else if (values[i] - values[best]) * direction >= 0.0 {
+            best = i;
+        } else if (values[i] - values[best]).abs() > HYSTERESIS * (values[best] - last).abs() {
+            let at = |list: &[f64]| [list[best - 1], list[best], list[best + 1]];
+            turns.push(parabola_top(at(times), at(values)).unwrap_or((times[best], values[best])));
+            last = values[best];
+            direction = -direction;
+            best = i;
+        }
+        if direction != 0.0 && best == 0 {
+            best = i;
+        }
+    }
+    turns
+}
+
+/// Where a parabola through three points has its top or bottom.
+fn parabola_top([x0, x1, x2]: [f64; 3], [y0, y1, y2]: [f64; 3]) -> Option<(f64, f64)> {
+    let (left, right) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
+    let curvature = (right - left) / (x2 - x0);
+    if curvature == 0.0 {
+        return None;
+    }
+    let x = 0.5 * (x0 + x1) - 0.5 * left / curvature;
+    Some((x, y0 + left * (x - x0) + curvature * (x - x0) * (x - x1)))
+}
+
+/// Slope of the straight line through values at 0, 1, 2, …
+fn slope(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let (up, down) = values.iter().enumerate().fold((0.0, 0.0), |(up, down), (i, y)| {
+        let x = i as f64 - middle;
+        (up + x * y, down + x * x)
+    });
+    up / down
+}
+
+/// Root mean square of how far the signals of a system differ from what they were `period` (s) before, as a share of what unrelated
+/// motion would give, over the last `window` (s): 0 repeats, 1 does not. `signals` holds one row of values per time.
+///
+/// ```text
+/// r = √(⟨|x(t) − x(t−T)|²⟩ / (2 ⟨|x − ⟨x⟩|²⟩))
+/// ```
+///
+/// `None` if the record is shorter than window and period, or nothing moves.
+pub fn repetition(times: &[f64], signals: &[Vec<f64>], period: f64, window: f64) -> Option<f64> {
+    let (first, last) = (*times.first()?, *times.last()?);
+    let start = last - window;
+    if start - period < first - 1e-9 * period {
+        return None;
+    }
+    let from = times.partition_point(|&t| t < start);
+    let rows = &signals[from..];
+    let width = rows.first()?.len();
+    let mean: Vec<f64> = (0..width).map(|k| rows.iter().map(|row| row[k]).sum::<f64>() / rows.len() as f64).collect();
+    let (mut change, mut spread) = (0.0, 0.0);
+    for (&t, row) in times[from..].iter().zip(rows) {
+        let before = (t - period).max(first);
+        let after = times.partition_point(|&time| time < before).clamp(1, times.len() - 1);
+        let share = (before - times[after - 1]) / (times[after] - times[after - 1]);
+        for k in 0..width {
+            let old = signals[after - 1][k] + share * (signals[after][k] - signals[after - 1][k]);
+            change += (row[k] - old).powi(2);
+            spread += (row[k] - mean[k]).powi(2);
+        }
+    }
+    (spread > 0.0).then(|| (change / (2.0 * spread)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn sampled(duration: f64, step: f64, of: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
+        let times: Vec<f64> = (0..=(duration / step).round() as usize).map(|i| i as f64 * step).collect();
+        let values = times.iter().map(|&t| of(t)).collect();
+        (times, values)
+    }
+
+    #[test]
+    fn a_harmonic_is_found_beside_its_mean_and_its_lag_is_negative() {
+        let (times, values) = sampled(0.5, 1e-3, |t| 3.0 + 2.0 * (2.0 * PI * 14.0 * t - 0.7).cos());
+        let fit = Harmonic::fit(&times, &values, 14.0).unwrap();
+        assert!((fit.mean - 3.0).abs() < 1e-12 && (fit.amplitude() - 2.0).abs() < 1e-12);
+        assert!((fit.phase_deg() + 0.7f64.to_degrees()).abs() < 1e-10);
+        assert_eq!(Harmonic::fit(&times[..2], &values[..2], 14.0), None);
+        assert_eq!(phase_difference_deg(-170.0, 170.0), 20.0);
+        assert_eq!(phase_difference_deg(170.0, -170.0), -20.0);
+    }
+
+    /// Step response of one mode, x = 1 − e^(−ζωt)(cos ω_d t + …), with a ripple of a second mode in its beginning.
+    #[test]
+    fn ringing_gives_frequency_and_damping_whatever_it_rings_about() {
+        for (f, zeta) in [(18.0, 0.02), (25.0, 0.1), (9.0, 0.3)] {
+            let omega: f64 = 2.0 * PI * f;
+            let damped = omega * (1.0_f64 - zeta * zeta).sqrt();
+            let (times, values) = sampled(20.0 / f, 1e-4, |t| {
+                -5.0 + (-zeta * omega * t).exp() * ((damped * t).cos() + zeta * omega / damped * (damped * t).sin())
+            });
+            let mode = Mode::of_ringing(&times, &values).unwrap();
+            // Sampling at 1e-4 s and a parabola: errors of the order of (ω Δt)² = 2e-4 at most.
+            assert!((mode.damping_ratio / zeta - 1.0).abs() < 2e-3, "{f} {zeta}: {mode:?}");
+            assert!((mode.resonance_hz / (f * (1.0_f64 - 2.0 * zeta * zeta).sqrt()) - 1.0).abs() < 2e-3, "{f} {zeta}: {mode:?}");
+        }
+        let (times, values) = sampled(1.0, 1e-3, |t| (-t).exp());
+        assert_eq!(Mode::of_ringing(&times, &values), None);
+        assert_eq!(Mode::of_ringing(&[], &[]), None);
+    }
+
+    #[test]
+    fn a_response_gives_its_peak_and_width() {
+        let (f0, zeta) = (23.0_f64, 0.05_f64);
+        let frequencies: Vec<f64> = (1..=160).map(|i| 0.25 * f64::from(i)).collect();
+        let response = |f: f64| 1.0 / ((1.0 - (f / f0).powi(2)).powi(2) + (2.0 * zeta * f / f0).powi(2)).sqrt();
+        let amplitudes: Vec<f64> = frequencies.iter().map(|&f| response(f)).collect();
+        let mode = Mode::of_response(&frequencies, &amplitudes).unwrap();
+        assert!((mode.resonance_hz - f0 * (1.0 - 2.0 * zeta * zeta).sqrt()).abs() < 0.02, "{mode:?}");
+        // Half-power width 2ζf₀ to second order in ζ, and straight lines between points: 2 %.
+        assert!((mode.damping_ratio / zeta - 1.0).abs() < 0.02, "{mode:?}");
+        assert_eq!(Mode::of_response(&frequencies[..80], &amplitudes[..80]), None);
+    }
+
+    #[test]
+    fn a_subharmonic_repeats_after_two_periods_only() {
+        let (times, values) = sampled(3.0, 1e-3, |t| (2.0 * PI * 5.0 * t).sin() + 0.7 * (2.0 * PI * 2.5 * t).cos());
+        let rows: Vec<Vec<f64>> = values.into_iter().map(|x| vec![x]).collect();
+        let r = |period: f64| repetition(&times, &rows, period, 0.8).unwrap();
+        // Only the subharmonic changes sign: r² = 4·0.7²/2/(2·(1 + 0.7²)/2).
+        assert!((r(0.2) - (2.0 * 0.49_f64 / 1.49).sqrt()).abs() < 1e-3);
+        assert!(r(0.4) < 1e-3);
+        assert_eq!(repetition(&times, &rows, 2.5, 0.8), None);
+    }
+}
