@@ -4,6 +4,7 @@ mod crosscheck;
 mod output;
 mod presets;
 mod run;
+mod sweep;
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -35,6 +36,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(run::Args),
+    Sweep(sweep::Args),
     Crosscheck(crosscheck::Args),
     /// List the built-in experiments.
     Presets,
@@ -160,6 +162,7 @@ pub fn main() -> ExitCode {
     let options = Options { quiet: cli.quiet, json: cli.json };
     let result = match cli.command {
         Command::Run(args) => run::run(&args, options),
+        Command::Sweep(args) => sweep::run(&args, options),
         Command::Crosscheck(args) => crosscheck::run(&args, options),
         Command::Presets => presets::list(options),
         Command::Preset { name } => presets::show(&name),

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
 use super::Failure;
+use crate::files;
 use crate::recording::{Recording, csv, npz};
 
 /// What a recording is written as.
@@ -84,22 +85,11 @@ impl Output {
         manifest_file.as_file().write_all(text.as_bytes()).map_err(|error| unwritable(&manifest_path, &error))?;
         for (file, path) in [(result, &self.path), (manifest_file, &manifest_path)] {
             // Temporary files are private; results are as readable as any file the user makes.
-            make_readable(file.as_file()).map_err(|error| unwritable(path, &error))?;
+            files::make_readable(file.as_file()).map_err(|error| unwritable(path, &error))?;
             file.persist(path).map_err(|error| unwritable(path, &error.error))?;
         }
         Ok(())
     }
-}
-
-#[cfg(unix)]
-fn make_readable(file: &std::fs::File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn make_readable(_: &std::fs::File) -> io::Result<()> {
-    Ok(())
 }
 
 /// What made a result: command line, resolved experiment, versions, wall time.

@@ -5,22 +5,37 @@ use std::process::ExitCode;
 use serde_json::json;
 
 use super::{Failure, Options, print};
-use crate::experiment::presets::{PRESETS, find};
+use crate::experiment::presets::{CLASSES, PRESETS, Preset, SWEEPS, find, find_class, find_sweep};
 
 pub fn list(options: Options) -> Result<ExitCode, Failure> {
     if options.json {
-        let presets: Vec<_> = PRESETS.iter().map(|p| json!({"name": p.name, "summary": p.summary()})).collect();
-        print(&format!("{}\n", json!({"schema": 1, "presets": presets})))?;
-    } else {
-        let width = PRESETS.iter().map(|preset| preset.name.len()).max().unwrap_or(0);
-        let lines = PRESETS.iter().map(|preset| format!("{:width$}  {}\n", preset.name, preset.summary()));
-        print(&lines.collect::<String>())?;
+        let objects = |list: &[Preset]| list.iter().map(|p| json!({"name": p.name, "summary": p.summary()})).collect::<Vec<_>>();
+        let classes: Vec<_> = CLASSES.iter().map(|c| json!({"class": c.name, "preset": c.preset, "sweep": c.sweep})).collect();
+        print(&format!(
+            "{}\n",
+            json!({"schema": 1, "presets": objects(PRESETS), "sweeps": objects(SWEEPS), "reference_classes": classes})
+        ))?;
+        return Ok(ExitCode::SUCCESS);
     }
+    let width = PRESETS.iter().chain(SWEEPS).map(|preset| preset.name.len()).max().unwrap_or(0);
+    let lines = |list: &[Preset]| list.iter().map(|p| format!("  {:width$}  {}\n", p.name, p.summary())).collect::<String>();
+    print(&format!(
+        "experiments (sfers preset NAME | sfers run -)\n{}\nsweeps (sfers sweep preset:NAME --out DIR)\n{}\n\
+         The reference's class names are presets too, with the class's own settings: sfers preset InchwormCrawl\n",
+        lines(PRESETS),
+        lines(SWEEPS)
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
 pub fn show(name: &str) -> Result<ExitCode, Failure> {
-    let preset = find(name).ok_or_else(|| Failure::Usage(format!("there is no preset {name:?}; sfers presets lists them")))?;
-    print(preset.text)?;
+    let text = match find_class(name) {
+        Some(class) => class.text(),
+        None => {
+            let unknown = || Failure::Usage(format!("there is no preset {name:?}; sfers presets lists them"));
+            find(name).or_else(|| find_sweep(name)).ok_or_else(unknown)?.text.to_owned()
+        }
+    };
+    print(&text)?;
     Ok(ExitCode::SUCCESS)
 }

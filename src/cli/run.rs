@@ -68,29 +68,13 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     });
     let wall = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
-    let Run { mut recording, interrupted, clamp_hits, energy } = result?;
-
-    if let Some(hits) = clamp_hits {
-        warnings.push(format!(
-            "Bullet limited a velocity to {} (cm/s or rad/s) after {} steps, first at step {}, t = {:.6} s: from there on the \
-             motion is not that of the model, and no measures are given; try a smaller time step, or look at the recording",
-            hits.limit,
-            hits.steps,
-            hits.first_step,
-            hits.first_step as f64 * experiment.time_step
-        ));
+    let run = result?;
+    let trouble = run.trouble(&experiment);
+    for problem in &trouble {
         // Even when quiet: the result is not what was asked for.
-        eprintln!("warning: {}", warnings[warnings.len() - 1]);
+        eprintln!("warning: {problem}; no measures are given");
     }
-    if let Some(fault) = energy.fault {
-        let link = fault.link.map_or_else(String::new, |link| format!(", on link {link} (0: left end)"));
-        warnings.push(format!(
-            "energy appeared that nothing supplied, {:.0} % of the largest mechanical energy, first at t = {:.6} s{link}: the              contact solver or a too long time step made it, and no measures are given; try a smaller time step or a smoother drive",
-            100.0 * energy.error(),
-            fault.time_s
-        ));
-        eprintln!("warning: {}", warnings[warnings.len() - 1]);
-    }
+    let Run { mut recording, interrupted, energy, .. } = run;
     let steps = recording.meta.steps;
     if interrupted {
         let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
@@ -102,10 +86,12 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         ground.date_time = date_time('_');
     }
 
-    let measures = match (clamp_hits, energy.fault) {
-        (None, None) => Measures::of(&recording, experiment.robot.mount, experiment.drive.period()),
-        _ => Measures::default(),
+    let measures = if trouble.is_empty() {
+        Measures::of(&recording, experiment.robot.mount, experiment.drive.period())
+    } else {
+        Measures::default()
     };
+    warnings.extend(trouble);
     let measures = Measures { energy_error: Some(energy.error()), ..measures };
     let steps_per_s = steps as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);

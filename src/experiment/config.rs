@@ -211,6 +211,16 @@ impl Source {
         }
     }
 
+    /// The text, without the settings.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The settings, as keys and values.
+    pub fn settings(&self) -> &[(String, String)] {
+        &self.settings
+    }
+
     /// Parses the text, then applies the settings.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! The loop over steps.
 
 use super::Experiment;
-use crate::engine::{Books, ClampHits, Engine, EnergyBalance, EngineError};
+use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
 
 /// Steps between two calls of the observer: often enough for a progress bar, too rare to cost anything.
@@ -27,6 +27,32 @@ pub struct Run {
     pub clamp_hits: Option<ClampHits>,
     /// Where energy came from and where it went.
     pub energy: EnergyBalance,
+}
+
+impl Run {
+    /// What went wrong without stopping the run; measures of such a run would be those of another robot.
+    pub fn trouble(&self, experiment: &Experiment) -> Vec<String> {
+        let clamp = self.clamp_hits.map(|hits| {
+            format!(
+                "Bullet limited a velocity to {} (cm/s or rad/s) after {} steps, first at step {}, t = {:.6} s: from there on the \
+                 motion is not that of the model; try a smaller time step",
+                hits.limit,
+                hits.steps,
+                hits.first_step,
+                hits.first_step as f64 * experiment.time_step
+            )
+        });
+        let energy = self.energy.fault.map(|fault| {
+            let link = fault.link.map_or_else(String::new, |link| format!(", on link {link} (0: left end)"));
+            format!(
+                "energy appeared that nothing supplied, {:.0} % of the largest mechanical energy, first at t = {:.6} s{link}: the \
+                 contact solver or a too long time step made it; try a smaller time step or a smoother drive",
+                100.0 * self.energy.error(),
+                fault.time_s
+            )
+        });
+        clamp.into_iter().chain(energy).collect()
+    }
 }
 
 /// Runs an experiment on an engine of its robot. `observe` is called every 256 steps with the number of steps done.

@@ -121,12 +121,10 @@ impl Measures {
         let tip: Vec<f64> = (0..recording.len()).map(|record| z_mm(recording, record, recording.nodes() - 1)).collect();
         let last = tip.len() - 1;
         let from = period.and_then(|period| periods_before_end(recording, period, 1)).unwrap_or(0);
-        let (low, high) = tip[from..].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
-        let mut measures = Self {
-            tip_deflection_mm: Some(tip[last]),
-            tip_amplitude_mm: Some((high - low) / 2.0),
-            ..Self::default()
-        };
+        let (low, high) =
+            tip[from..].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
+        let mut measures =
+            Self { tip_deflection_mm: Some(tip[last]), tip_amplitude_mm: Some((high - low) / 2.0), ..Self::default() };
         if let Some(period) = period {
             let volts: Vec<f64> = recording.motor_voltages.iter().step_by(recording.joints()).copied().collect();
             measures.tip_phase_deg = phase_between(recording, &tip, &volts, period);
@@ -162,8 +160,7 @@ impl Measures {
             let height = |node: usize| (0..records).map(|r| z_mm(recording, r, node)).collect::<Vec<_>>();
             // Of an even number of nodes the two in the middle stand for it.
             let mean = |a: usize, b: usize| height(a).iter().zip(height(b)).map(|(a, b)| (a + b) / 2.0).collect::<Vec<_>>();
-            measures.mid_end_phase_deg =
-                phase_between(recording, &mean((nodes - 1) / 2, nodes / 2), &mean(0, nodes - 1), period);
+            measures.mid_end_phase_deg = phase_between(recording, &mean((nodes - 1) / 2, nodes / 2), &mean(0, nodes - 1), period);
         }
         if ground {
             let states = contact_states(recording);

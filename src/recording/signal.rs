@@ -110,11 +110,7 @@ impl Mode {
         };
         let left = (0..top).rev().find(|&i| amplitudes[i] < half).map(|i| cross(i, i + 1))?;
         let right = (top + 1..amplitudes.len()).find(|&i| amplitudes[i] < half).map(|i| cross(i, i - 1))?;
-        Some(Self {
-            resonance_hz,
-            damping_ratio: (right - left) / (2.0 * resonance_hz),
-            half_power_bandwidth_hz: right - left,
-        })
+        Some(Self { resonance_hz, damping_ratio: (right - left) / (2.0 * resonance_hz), half_power_bandwidth_hz: right - left })
     }
 }
 

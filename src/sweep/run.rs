@@ -1,0 +1,98 @@
+//! Computing the points that are not there yet.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use super::{Row, RowError, Rows, Sweep};
+use crate::experiment::{self, Control, Run};
+use crate::recording::measures::Measures;
+
+/// What a sweep has done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Outcome {
+    /// Points that were there before.
+    pub before: usize,
+    /// Points computed now.
+    pub computed: usize,
+    /// Points of this shard whose status is not `ok`.
+    pub failed: usize,
+    /// Whether `stop` ended it early.
+    pub interrupted: bool,
+}
+
+/// Computes the missing points of shard `shard` (from 1) of `shards`, on `jobs` threads. Every row is on disk before the next begins on
+/// that thread. `progress` is called with the number of points done and of all points of the shard; when `stop` turns true, points in
+/// work are given up.
+///
+/// # Errors
+/// [`RowError`] if the rows cannot be read or written. A point that fails is a row.
+pub fn run(
+    sweep: &Sweep,
+    folder: &Path,
+    (shard, shards): (usize, usize),
+    jobs: usize,
+    stop: &AtomicBool,
+    progress: impl Fn(usize, usize) + Sync,
+) -> Result<Outcome, RowError> {
+    let rows = Rows::open(folder, sweep, shard, shards)?;
+    let mine: Vec<usize> = (0..sweep.len()).filter(|index| index % shards == shard - 1).collect();
+    let todo: Vec<usize> = mine.iter().copied().filter(|index| !rows.done().contains_key(index)).collect();
+    let before = mine.len() - todo.len();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
+    let pool =
+        pool.map_err(|error| RowError::Io { path: folder.into(), reason: format!("threads cannot be started: {error}") })?;
+    progress(before, mine.len());
+    let rows = Mutex::new(rows);
+    let broken = AtomicBool::new(false);
+    let given_up = || stop.load(Ordering::Relaxed) || broken.load(Ordering::Relaxed);
+    let result = pool.install(|| {
+        todo.par_iter().with_max_len(1).try_for_each(|&index| {
+            if given_up() {
+                return Ok(());
+            }
+            let Some(row) = compute(sweep, index, &given_up) else { return Ok(()) };
+            let mut rows = rows.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let result = rows.append(row);
+            broken.fetch_or(result.is_err(), Ordering::Relaxed);
+            progress(rows.done().len(), mine.len());
+            result
+        })
+    });
+    let rows = rows.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+    result?;
+    Ok(Outcome {
+        before,
+        computed: rows.done().len() - before,
+        failed: rows.done().values().filter(|row| row.status != "ok").count(),
+        interrupted: rows.done().len() < mine.len(),
+    })
+}
+
+/// Runs one point; `None` if it was given up.
+fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Option<Row> {
+    let run = sweep.experiment(index).map_err(|error| error.to_string()).and_then(|experiment| {
+        let mut engine = experiment.engine().map_err(|error| error.to_string())?;
+        let observe = |_| if given_up() { Control::Stop } else { Control::Continue };
+        let run = experiment::run(&experiment, &mut engine, observe).map_err(|error| error.to_string())?;
+        Ok((experiment, run))
+    });
+    let none = vec![None; sweep.measures.len()];
+    let (experiment, run) = match run {
+        Ok((_, Run { interrupted: true, .. })) => return None,
+        Ok(pair) => pair,
+        Err(reason) => return Some(Row { index, measures: none, status: format!("failed: {reason}") }),
+    };
+    let trouble = run.trouble(&experiment);
+    if let Some(reason) = trouble.first() {
+        return Some(Row { index, measures: none, status: format!("failed: {reason}") });
+    }
+    let measures = Measures {
+        energy_error: Some(run.energy.error()),
+        ..Measures::of(&run.recording, experiment.robot.mount, experiment.drive.period())
+    };
+    let measures = sweep.measures.iter().map(|name| measures.get(name)).collect();
+    Some(Row { index, measures, status: "ok".into() })
+}
