@@ -370,3 +370,29 @@ proptest! {
         let _ = experiment(&Source::from_text("mangled", text.into_iter().collect::<String>()));
     }
 }
+
+#[test]
+fn a_run_goes_on_from_a_saved_state_with_the_same_bits_and_not_from_another_robots() {
+    let bench = Bench::new(CANTILEVER);
+    let done = |arguments: &[&str]| {
+        let output = bench.sfers(arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    done(&["run", "a.toml", "--out", "whole.npz"]);
+    done(&["run", "a.toml", "--set", "simulation.steps=120", "--save-state", "s.json"]);
+    done(&["run", "a.toml", "--load-state", "s.json", "--out", "rest.npz"]);
+    let whole = npz::read_file(&bench.path("whole.npz")).unwrap();
+    let rest = npz::read_file(&bench.path("rest.npz")).unwrap();
+    // Records of steps 149 and 199; the whole run has those of 0, 49, 99 before.
+    assert_eq!((whole.len(), rest.len()), (5, 2));
+    assert_eq!(rest.time, whole.time[3..]);
+    assert_eq!(rest.angles, whole.angles[9..]);
+    assert_eq!(rest.positions, whole.positions[45..]);
+
+    bench.refuses(&["run", "a.toml", "--load-state", "s.json", "--set", "robot.damping_eta=0.1"], 3, &["damping_eta", "s.json"]);
+    bench.refuses(&["run", "a.toml", "--load-state", "s.json", "--set", "simulation.steps=100"], 3, &["simulation.steps"]);
+    bench.refuses(&["run", "a.toml", "--load-state", "a.toml"], 3, &["not a saved state"]);
+    let cut = fs::read_to_string(bench.path("s.json")).unwrap().replace("\"state\":[", "\"state\":[1.0,");
+    fs::write(bench.path("cut.json"), cut).unwrap();
+    bench.refuses(&["run", "a.toml", "--load-state", "cut.json"], 3, &["cut.json"]);
+}

@@ -70,15 +70,15 @@ fn a_snapshot_restored_in_the_middle_of_a_jump_goes_on_with_the_same_bits() {
     for at in [4500, 7000, 9500] {
         let mut engine = experiment.engine().unwrap();
         advance(&experiment, &mut engine, 0, at);
-        let snapshot = engine.snapshot().unwrap();
+        let state = engine.save().unwrap();
         let on = advance(&experiment, &mut engine, at, at + 2500);
 
-        engine.restore(&snapshot).unwrap();
+        engine.load(at, &state).unwrap();
         assert_eq!(engine.step(), at);
         assert!(advance(&experiment, &mut engine, at, at + 2500) == on, "the same engine, step {at}");
 
         let mut fresh = experiment.engine().unwrap();
-        fresh.restore(&snapshot).unwrap();
+        fresh.load(at, &state).unwrap();
         assert!(advance(&experiment, &mut fresh, at, at + 2500) == on, "a fresh engine, step {at}");
     }
 }
@@ -105,9 +105,9 @@ fn a_snapshot_of_another_robot_is_refused_and_changes_nothing() {
     let mut source = Source::from_text("x", experiment::presets::find("jump-14hz").unwrap().text);
     source.set("robot.motors_per_actuator=2").unwrap();
     let other = experiment::experiment(&source).unwrap();
-    let foreign = other.engine().unwrap().snapshot().unwrap();
+    let foreign = other.engine().unwrap().save().unwrap();
     let mut engine = experiment.engine().unwrap();
-    let before = engine.snapshot().unwrap();
-    assert!(engine.restore(&foreign).is_err());
-    assert_eq!(engine.snapshot().unwrap(), before);
+    let before = engine.save().unwrap();
+    assert!(engine.load(0, &foreign).is_err());
+    assert_eq!(engine.save().unwrap(), before);
 }

@@ -25,6 +25,11 @@ impl Snapshot {
         &self.data
     }
 
+    /// The snapshot's numbers themselves.
+    pub fn into_vec(self) -> Vec<f64> {
+        self.data
+    }
+
     /// A snapshot from stored numbers. Whether they fit is checked by [`World::restore`].
     pub fn from_vec(data: Vec<f64>) -> Self {
         Self { data }

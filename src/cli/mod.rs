@@ -1,7 +1,9 @@
 //! The command line: one file per subcommand, no physics.
 
+mod animate;
 mod crosscheck;
 mod output;
+mod plot;
 mod presets;
 mod run;
 mod sweep;
@@ -37,6 +39,8 @@ struct Cli {
 enum Command {
     Run(run::Args),
     Sweep(sweep::Args),
+    Plot(plot::Args),
+    Animate(animate::Args),
     Crosscheck(crosscheck::Args),
     /// List the built-in experiments.
     Presets,
@@ -163,6 +167,8 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Run(args) => run::run(&args, options),
         Command::Sweep(args) => sweep::run(&args, options),
+        Command::Plot(args) => plot::run(&args, options),
+        Command::Animate(args) => animate::run(&args, options),
         Command::Crosscheck(args) => crosscheck::run(&args, options),
         Command::Presets => presets::list(options),
         Command::Preset { name } => presets::show(&name),

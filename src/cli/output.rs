@@ -1,14 +1,13 @@
 //! Output files: opened before the work starts, written whole or not at all.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
-use tempfile::NamedTempFile;
 
 use super::Failure;
-use crate::files;
+use crate::files::Pending;
 use crate::recording::{Recording, csv, npz};
 
 /// What a recording is written as.
@@ -26,14 +25,14 @@ pub struct Output {
     files: Option<Files>,
 }
 
-/// The result and its manifest, as temporary files beside their final places.
+/// The result and its manifest.
 struct Files {
-    result: NamedTempFile,
-    manifest: NamedTempFile,
-    manifest_path: PathBuf,
+    result: Pending,
+    manifest: Pending,
 }
 
-fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
+/// The failure that a file cannot be written.
+pub fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
     Failure::Usage(format!("{}: cannot be written: {reason}", path.display()))
 }
 
@@ -48,14 +47,9 @@ impl Output {
             Some("csv") => Format::Csv,
             _ => return Err(Failure::Usage(format!("{}: the name must end in .npz or .csv", path.display()))),
         };
-        if path.is_dir() {
-            return Err(unwritable(path, &"it is a folder"));
-        }
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let temporary = || NamedTempFile::new_in(folder).map_err(|error| unwritable(path, &error));
-        let mut manifest_path = path.as_os_str().to_owned();
-        manifest_path.push(".manifest.json");
-        let files = Files { result: temporary()?, manifest: temporary()?, manifest_path: manifest_path.into() };
+        let mut manifest = path.as_os_str().to_owned();
+        manifest.push(".manifest.json");
+        let files = Files { result: pending(path)?, manifest: pending(Path::new(&manifest))? };
         Ok(Self { path: path.into(), format, files: Some(files) })
     }
 
@@ -71,25 +65,28 @@ impl Output {
 
     /// Writes the recording and its manifest, and moves both to their places.
     pub fn write(self, recording: &Recording, manifest: &Value) -> Result<(), Failure> {
-        let Some(Files { result, manifest: manifest_file, manifest_path }) = self.files else {
-            let mut bytes = Vec::new();
-            csv::write(recording, &mut bytes, &self.path)?;
+        let mut bytes = Vec::new();
+        match self.format {
+            Format::Npz => npz::write(recording, &mut bytes, &self.path)?,
+            Format::Csv => csv::write(recording, &mut bytes, &self.path)?,
+        }
+        let Some(Files { result, manifest: manifest_file }) = self.files else {
             return Ok(io::stdout().lock().write_all(&bytes)?);
         };
-        let writer = BufWriter::new(result.as_file());
-        match self.format {
-            Format::Npz => npz::write(recording, writer, &self.path)?,
-            Format::Csv => csv::write(recording, writer, &self.path)?,
-        }
-        let text = format!("{manifest:#}\n");
-        manifest_file.as_file().write_all(text.as_bytes()).map_err(|error| unwritable(&manifest_path, &error))?;
-        for (file, path) in [(result, &self.path), (manifest_file, &manifest_path)] {
-            // Temporary files are private; results are as readable as any file the user makes.
-            files::make_readable(file.as_file()).map_err(|error| unwritable(path, &error))?;
-            file.persist(path).map_err(|error| unwritable(path, &error.error))?;
-        }
-        Ok(())
+        finish(result, &bytes)?;
+        finish(manifest_file, format!("{manifest:#}\n").as_bytes())
     }
+}
+
+/// Opens a file to be written later.
+pub fn pending(path: &Path) -> Result<Pending, Failure> {
+    Pending::open(path).map_err(|error| unwritable(path, &error))
+}
+
+/// Writes a file that was opened before.
+pub fn finish(file: Pending, bytes: &[u8]) -> Result<(), Failure> {
+    let path = file.path().to_owned();
+    file.finish(bytes).map_err(|error| unwritable(&path, &error))
 }
 
 /// What made a result: command line, resolved experiment, versions, wall time.

@@ -8,10 +8,11 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::output::{Output, date_time, manifest};
+use super::output::{Output, date_time, finish, manifest, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print};
 use crate::analytic;
-use crate::experiment::{self, Control, Experiment, Run, Source};
+use crate::engine::Engine;
+use crate::experiment::{self, Control, Experiment, Run, SavedState, Source};
 use crate::recording::measures::Measures;
 
 /// Simulate an experiment and print its measures.
@@ -27,6 +28,12 @@ pub struct Args {
     /// Save the recording: FILE.npz (the reference's keys, CGS) or FILE.csv (units in the header); `-` is CSV on standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Save the state at the end, for another run to go on from.
+    #[arg(long, value_name = "FILE")]
+    save_state: Option<PathBuf>,
+    /// Go on from a saved state of the same robot: the experiment's steps count from its beginning.
+    #[arg(long, value_name = "FILE")]
+    load_state: Option<PathBuf>,
 }
 
 static INTERRUPT: AtomicBool = AtomicBool::new(false);
@@ -49,7 +56,11 @@ pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let experiment = experiment::experiment(&source(&args.experiment, &args.settings)?)?;
     let output = args.out.as_deref().map(Output::open).transpose()?;
+    let state_file = args.save_state.as_deref().map(pending).transpose()?;
     let mut engine = experiment.engine()?;
+    if let Some(path) = &args.load_state {
+        load_state(path, &experiment, &mut engine)?;
+    }
 
     let mut warnings = Vec::new();
     let stable = analytic::stable_step(&experiment.robot);
@@ -60,6 +71,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     // The first Ctrl-C ends the run in good order; without a handler (a second one in this process) it ends at once.
     let _ = ctrlc::set_handler(|| INTERRUPT.store(true, Ordering::Relaxed));
 
+    let first_step = engine.step();
     let bar = progress(&experiment, options);
     let start = Instant::now();
     let result = experiment::run(&experiment, &mut engine, |done| {
@@ -93,9 +105,14 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     };
     warnings.extend(trouble);
     let measures = Measures { energy_error: Some(energy.error()), ..measures };
-    let steps_per_s = steps as f64 / wall.max(1e-9);
+    let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);
+    if let Some(file) = state_file {
+        let state = SavedState::of(&experiment, &engine)?;
+        let text = serde_json::to_string(&state).map_err(|error| unwritable(file.path(), &error))?;
+        finish(file, text.as_bytes())?;
+    }
     if let Some(output) = output {
         output.write(&recording, &manifest(&experiment, wall, interrupted))?;
     }
@@ -130,6 +147,19 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         print(&text)?;
     }
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+fn load_state(path: &Path, experiment: &Experiment, engine: &mut dyn Engine) -> Result<(), Failure> {
+    let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| bad(error.to_string()))?;
+    let state = SavedState::parse(&text, experiment).map_err(bad)?;
+    if state.step >= experiment.steps {
+        return Err(bad(format!(
+            "is at step {}, and the experiment ends at step {}; set simulation.steps higher",
+            state.step, experiment.steps
+        )));
+    }
+    state.load_into(engine).map_err(|error| bad(error.to_string()))
 }
 
 /// A bar on stderr; indicatif hides it where stderr is no terminal.

@@ -85,24 +85,6 @@ impl BulletEngine {
         (&mut self.world, self.body)
     }
 
-    /// Takes a snapshot of the state between two steps.
-    ///
-    /// # Errors
-    /// [`EngineError::Bullet`].
-    pub fn snapshot(&self) -> Result<(u64, Snapshot), EngineError> {
-        Ok((self.step, self.world.snapshot()?))
-    }
-
-    /// Goes back, or on, to a snapshot of an engine of the same robot.
-    ///
-    /// # Errors
-    /// [`EngineError::Bullet`] if it is of another robot.
-    pub fn restore(&mut self, (step, snapshot): &(u64, Snapshot)) -> Result<(), EngineError> {
-        self.world.restore(snapshot)?;
-        self.step = *step;
-        Ok(())
-    }
-
     fn not_finite(&self, what: String, value: f64) -> EngineError {
         let time = self.step as f64 * self.time_step;
         EngineError::NotFinite { what, value, step: self.step, time, stable_step: self.stable_step }
@@ -273,6 +255,16 @@ impl Engine for BulletEngine {
             hits.steps += 1;
         }
         self.step += 1;
+        Ok(())
+    }
+
+    fn save(&self) -> Result<Vec<f64>, EngineError> {
+        Ok(self.world.snapshot()?.into_vec())
+    }
+
+    fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
+        self.world.restore(&Snapshot::from_vec(state.to_vec()))?;
+        self.step = step;
         Ok(())
     }
 

@@ -111,6 +111,18 @@ pub trait Engine {
     /// Whatever the engine's library reports.
     fn advance(&mut self) -> Result<(), EngineError>;
 
+    /// Everything that a later step depends on, as numbers for storing.
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn save(&self) -> Result<Vec<f64>, EngineError>;
+
+    /// Goes on from a state that an engine of the same robot saved before step `step`.
+    ///
+    /// # Errors
+    /// If the numbers are not a state of this robot; nothing is changed then.
+    fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError>;
+
     /// Number of steps taken.
     fn step(&self) -> u64;
 

@@ -6,12 +6,14 @@ pub mod presets;
 mod resolve;
 mod run;
 mod spec;
+mod state;
 
 pub use config::{
     Config, ConfigError, DriveConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
 };
 pub use resolve::experiment;
 pub use run::{Control, Run, run};
+pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};
 use crate::engine::{BulletEngine, EngineError};

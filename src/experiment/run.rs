@@ -55,7 +55,7 @@ impl Run {
     }
 }
 
-/// Runs an experiment on an engine of its robot. `observe` is called every 256 steps with the number of steps done.
+/// Runs an experiment on an engine of its robot, from the engine's step on. `observe` is called every 256 steps with the number of steps done.
 ///
 /// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time
 /// is step · dt; joints are read and torques computed; the state before the step is recorded if its turn has come; the torques are
@@ -71,9 +71,9 @@ pub fn run(
     let mut recorder = Recorder::new(experiment);
     let mut books = Books::new(&experiment.robot, experiment.time_step);
     let mut voltages = vec![0.0; experiment.robot.actuators];
-    let mut time = 0.0;
     let mut interrupted = false;
-    let mut done = 0;
+    let mut done = engine.step();
+    let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
     while done < experiment.steps {
         if done % OBSERVE_EVERY == 0 && observe(done) == Control::Stop {
             interrupted = true;

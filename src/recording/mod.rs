@@ -112,6 +112,27 @@ impl Recording {
         self.joints() + 2
     }
 
+    /// Centre of mass (cm) in a record, x, y, z: each actuator's mass is spread evenly between the nodes, so links weigh by length.
+    ///
+    /// ```text
+    /// r = (Σ w_i r_i)/(Σ w_i)    w: half the links on either side of a node
+    /// ```
+    ///
+    /// The ends' links are half as long as the others, so the ends weigh a quarter and their neighbours three quarters of an inner node.
+    pub fn centre_of_mass(&self, record: usize) -> [f64; 3] {
+        let last = self.nodes() - 1;
+        let length = |link: usize| if link == 0 || link + 1 == last { 0.5 } else { 1.0 };
+        let mut sum = [0.0; 4];
+        for link in 0..last {
+            let (a, b) = (self.node(record, link), self.node(record, link + 1));
+            for axis in 0..3 {
+                sum[axis] += length(link) * 0.5 * (a[axis] + b[axis]);
+            }
+            sum[3] += length(link);
+        }
+        [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]
+    }
+
     /// Position (cm) of a node in a record: x, y, z.
     pub fn node(&self, record: usize, node: usize) -> [f64; 3] {
         let at = 3 * (record * self.nodes() + node);

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::Sweep;
+use crate::files::Pending;
 
 /// One finished point.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,14 +148,8 @@ fn claim(folder: &Path, sweep: &Sweep) -> Result<(), RowError> {
     replace(&path, identity.as_bytes())
 }
 
-/// Writes a file whole or not at all.
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), RowError> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io(path))?;
-    file.write_all(bytes).map_err(io(path))?;
-    crate::files::make_readable(file.as_file()).map_err(io(path))?;
-    file.persist(path).map_err(|error| io(path)(error.error))?;
-    Ok(())
+    Pending::open(path).and_then(|pending| pending.finish(bytes)).map_err(io(path))
 }
 
 fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row>, RowError> {

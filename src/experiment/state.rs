@@ -1,0 +1,66 @@
+//! States on disk: a run can end here and go on elsewhere with the same bits.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::Experiment;
+use crate::engine::{Engine, EngineError};
+
+/// A state between two steps, as a JSON object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedState {
+    schema: u32,
+    /// The robot and time step it belongs to, from [`Experiment::spec`].
+    robot: Value,
+    /// Number of steps taken.
+    pub step: u64,
+    state: Vec<f64>,
+}
+
+/// What of an experiment must be the same for a state to fit: all of the robot, and the step; drive and length may differ.
+fn robot(experiment: &Experiment) -> Value {
+    let mut spec = experiment.spec();
+    if let Value::Object(fields) = &mut spec {
+        for key in ["drive", "steps", "record_every_steps"] {
+            fields.remove(key);
+        }
+    }
+    spec
+}
+
+impl SavedState {
+    /// The state of an engine that runs `experiment`.
+    ///
+    /// # Errors
+    /// Whatever the engine reports.
+    pub fn of(experiment: &Experiment, engine: &dyn Engine) -> Result<Self, EngineError> {
+        Ok(Self { schema: 1, robot: robot(experiment), step: engine.step(), state: engine.save()? })
+    }
+
+    /// Reads a state and checks that it is one of `experiment`'s robot.
+    ///
+    /// # Errors
+    /// What is wrong with the text, in words.
+    pub fn parse(text: &str, experiment: &Experiment) -> Result<Self, String> {
+        let saved: Self = serde_json::from_str(text).map_err(|error| format!("not a saved state: {error}"))?;
+        if saved.schema != 1 {
+            return Err(format!("a state of schema {}, but this program reads schema 1", saved.schema));
+        }
+        let Value::Object(needed) = robot(experiment) else { return Err("no robot".into()) };
+        match needed.iter().find(|(key, value)| saved.robot.get(key) != Some(value)) {
+            Some((key, value)) => {
+                Err(format!("saved with another {key}: {} there, {value} here", saved.robot.get(key).unwrap_or(&Value::Null)))
+            }
+            None => Ok(saved),
+        }
+    }
+
+    /// Puts an engine of the same robot into this state.
+    ///
+    /// # Errors
+    /// Whatever the engine reports.
+    pub fn load_into(&self, engine: &mut dyn Engine) -> Result<(), EngineError> {
+        engine.load(self.step, &self.state)
+    }
+}

@@ -1,0 +1,162 @@
+//! Figures of one recording.
+
+use super::figure::{Figure, Mark};
+use super::heatmap::colour;
+use crate::model::units::mm_from_cm;
+use crate::recording::Recording;
+
+/// What is drawn of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// The robot's shape at some times.
+    Shapes,
+    /// Heights of left end, middle and right end, and travel, in time.
+    Traces,
+    /// Amplitude spectra of the same heights.
+    Spectrum,
+}
+
+/// Shapes drawn over one another at most.
+const SHAPES: usize = 8;
+
+impl Kind {
+    /// Draws the figure.
+    pub fn figure(self, recording: &Recording) -> Figure {
+        match self {
+            Self::Shapes => {
+                let last = recording.len().saturating_sub(1);
+                let count = SHAPES.min(recording.len());
+                let records: Vec<usize> = (0..count).map(|i| i * last / (count - 1).max(1)).collect();
+                shapes("Shapes over time", recording, &records)
+            }
+            Self::Traces => traces("Nodes over time", recording),
+            Self::Spectrum => spectrum("Spectrum", recording),
+        }
+    }
+}
+
+/// Shapes of some records over one another, darker ones earlier, with the floor for robots that lie on one.
+pub fn shapes(title: &str, recording: &Recording, records: &[usize]) -> Figure {
+    let mut figure = Figure::new(title, "x (mm)", "z (mm)");
+    figure.equal_aspect();
+    if recording.meta.ground.is_some() {
+        figure.horizontal(0.0);
+    }
+    for (i, &record) in records.iter().enumerate() {
+        let share = i as f64 / (records.len().max(2) - 1) as f64;
+        let label = format!("{:.1} ms", 1e3 * recording.time[record]);
+        figure.line(&label, shape(recording, record), &colour(0.9 * share), 2.2);
+    }
+    figure
+}
+
+/// The nodes of one record, x and z (mm).
+pub fn shape(recording: &Recording, record: usize) -> Vec<(f64, f64)> {
+    (0..recording.nodes())
+        .map(|node| {
+            let [x, _, z] = recording.node(record, node);
+            (mm_from_cm(x), mm_from_cm(z))
+        })
+        .collect()
+}
+
+/// Name and index of left end, middle and right end.
+fn watched(recording: &Recording) -> [(&'static str, usize); 3] {
+    [("left end", 0), ("middle", recording.nodes() / 2), ("right end", recording.nodes() - 1)]
+}
+
+fn height(recording: &Recording, node: usize) -> Vec<f64> {
+    (0..recording.len()).map(|record| mm_from_cm(recording.node(record, node)[2])).collect()
+}
+
+/// Heights of ends and middle in time.
+pub fn traces(title: &str, recording: &Recording) -> Figure {
+    let mut figure = Figure::new(title, "time (ms)", "height z (mm)");
+    for (label, node) in watched(recording) {
+        let z = height(recording, node);
+        figure.series(label, recording.time.iter().zip(z).map(|(t, z)| (1e3 * t, z)), Mark::Line);
+    }
+    figure
+}
+
+/// Amplitude spectra of the heights of ends and middle, up to where they have fallen to nothing.
+pub fn spectrum(title: &str, recording: &Recording) -> Figure {
+    let mut figure = Figure::new(title, "frequency (Hz)", "amplitude of z (mm)");
+    let spectra: Vec<_> = watched(recording)
+        .into_iter()
+        .map(|(label, node)| (label, amplitudes(&recording.time, &height(recording, node))))
+        .collect();
+    let highest = spectra.iter().flat_map(|(_, s)| s).map(|p| p.1).fold(0.0, f64::max);
+    let limit = spectra.iter().flat_map(|(_, s)| s).filter(|p| p.1 > 0.01 * highest).map(|p| p.0).fold(0.0, f64::max);
+    for (label, spectrum) in spectra {
+        let shown: Vec<_> = spectrum.into_iter().filter(|p| p.0 <= 1.5 * limit).collect();
+        let peak = shown.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
+        figure.series(label, shown, Mark::Line);
+        if let Some((f, a)) = peak.filter(|p| p.1 > 0.5 * highest) {
+            figure.note(f, a, &format!(" {f:.1} Hz"));
+        }
+    }
+    figure
+}
+
+/// Single-sided amplitude spectrum of a signal without its straight line, under a Hann window: frequency (Hz) and amplitude.
+///
+/// ```text
+/// A(f) = 2/Σw |Σ w_n x_n e^(−2πi f t_n)|,    w_n = (1 − cos 2πn/(N−1))/2
+/// ```
+///
+/// at multiples of a quarter of 1/duration. A sine of amplitude a, many periods long, gives a at its frequency. Samples are interpolated
+/// to even spacing.
+pub fn amplitudes(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    let n = times.len();
+    if n < 4 {
+        return Vec::new();
+    }
+    let (first, duration) = (times[0], times[n - 1] - times[0]);
+    let step = duration / (n - 1) as f64;
+    let even: Vec<f64> = (0..n)
+        .map(|i| {
+            let t = first + i as f64 * step;
+            let after = times.partition_point(|&time| time < t).clamp(1, n - 1);
+            let share = (t - times[after - 1]) / (times[after] - times[after - 1]);
+            values[after - 1] + share * (values[after] - values[after - 1])
+        })
+        .collect();
+    let middle = (n - 1) as f64 / 2.0;
+    let mean = even.iter().sum::<f64>() / n as f64;
+    let (up, down) = even.iter().enumerate().fold((0.0, 0.0), |(up, down), (i, x)| {
+        let at = i as f64 - middle;
+        (up + at * x, down + at * at)
+    });
+    let window = |i: usize| 0.5 - 0.5 * (2.0 * std::f64::consts::PI * i as f64 / (n - 1) as f64).cos();
+    let weighted: Vec<f64> =
+        even.iter().enumerate().map(|(i, x)| window(i) * (x - mean - up / down * (i as f64 - middle))).collect();
+    let weight = (n - 1) as f64 / 2.0;
+    // Up to half the sampling rate, and not more than a page can show.
+    (1..(2 * n).min(1200))
+        .map(|k| {
+            let turn = 0.5 * std::f64::consts::PI * k as f64 / (n - 1) as f64;
+            let (c, s) = weighted.iter().enumerate().fold((0.0, 0.0), |(c, s), (i, x)| {
+                let phase = turn * i as f64;
+                (c + x * phase.cos(), s + x * phase.sin())
+            });
+            (0.25 * k as f64 / duration, 2.0 / weight * f64::hypot(c, s))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sine_has_its_amplitude_at_its_frequency_whatever_it_drifts_by() {
+        let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
+        let values: Vec<f64> = times.iter().map(|t| 3.0 + t + 2.0 * (2.0 * std::f64::consts::PI * 14.0 * t).cos()).collect();
+        let spectrum = amplitudes(&times, &values);
+        let (f, a) = spectrum.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        // The straight line through a cosine of whole periods is level to 1/N.
+        assert!((f - 14.0).abs() < 1e-9 && (a - 2.0).abs() < 0.01, "{f} {a}");
+        assert!(amplitudes(&times[..3], &values[..3]).is_empty());
+    }
+}
