@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 
 long=false
 if [ "${1:-}" = --long ] || [ "${CI:-}" = true ]; then long=true; fi
-packages=(build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv)
+packages=(build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv chromium)
 if $long; then packages+=(valgrind); fi
 bash scripts/debian.sh "${packages[@]}"
 bash scripts/python.sh

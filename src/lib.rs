@@ -4,7 +4,7 @@
 //!
 //! [`model`] turns a laminate's layers into a beam and the beam into a chain of links and hinges; [`drive`] gives every actuator a voltage
 //! in time; [`actuator`] turns angle, rate and voltage of a joint into its torque; an [`engine`] steps the chain; an
-//! [`experiment`] runs the loop and fills a [`recording`], from which measures are taken. [`sweep`] does so over a grid of values; [`view`] draws. [`crosscheck`] compares a recording with the
+//! [`experiment`] runs the loop and fills a [`recording`], from which measures are taken. [`sweep`] does so over a grid of values; [`view`] draws; [`export`] writes the robots for other simulators. [`crosscheck`] compares a recording with the
 //! published simulator's, number by number. [`bullet`] is the safe layer over the physics library, [`analytic`] holds closed forms.
 //!
 //! # Units and frame
@@ -66,6 +66,7 @@ pub mod crosscheck;
 pub mod drive;
 pub mod engine;
 pub mod experiment;
+pub mod export;
 mod files;
 pub mod model;
 pub mod recording;

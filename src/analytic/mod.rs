@@ -139,6 +139,7 @@ mod tests {
             collision_thickness: 0.1,
             positive_gain: 1.0,
             friction: Friction { ground: 1.0, low: 1.0, high: 1.0, film: Film::None, film_fraction: 0.5 },
+            bodies: None,
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod animate;
 mod crosscheck;
+mod export;
 mod output;
 mod plot;
 mod presets;
@@ -40,6 +41,14 @@ enum Command {
     Run(run::Args),
     Sweep(sweep::Args),
     Plot(plot::Args),
+    /// Write the robot as URDF.
+    ///
+    /// Example: sfers preset cantilever-dc | sfers urdf - --out cantilever.urdf
+    Urdf(export::Args),
+    /// Write the robot, with springs, dampers, actuators and floor, as MJCF for MuJoCo.
+    ///
+    /// Example: sfers preset jump-14hz | sfers mjcf - --out robot.xml
+    Mjcf(export::Args),
     Animate(animate::Args),
     Crosscheck(crosscheck::Args),
     /// List the built-in experiments.
@@ -167,6 +176,8 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Run(args) => run::run(&args, options),
         Command::Sweep(args) => sweep::run(&args, options),
+        Command::Urdf(args) => export::run(export::Format::Urdf, &args, options),
+        Command::Mjcf(args) => export::run(export::Format::Mjcf, &args, options),
         Command::Plot(args) => plot::run(&args, options),
         Command::Animate(args) => animate::run(&args, options),
         Command::Crosscheck(args) => crosscheck::run(&args, options),

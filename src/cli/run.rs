@@ -13,6 +13,7 @@ use super::{Failure, INTERRUPTED, Options, print};
 use crate::analytic;
 use crate::engine::Engine;
 use crate::experiment::{self, Control, Experiment, Run, SavedState, Source};
+use crate::export;
 use crate::recording::measures::Measures;
 
 /// Simulate an experiment and print its measures.
@@ -25,6 +26,9 @@ pub struct Args {
     /// Override a key, for example robot.damping_eta=0.03. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+    /// Take the bodies from a URDF: a chain of boxes with hinges about +y. `-` is standard input.
+    #[arg(long, value_name = "FILE.urdf")]
+    robot: Option<PathBuf>,
     /// Save the recording: FILE.npz (the reference's keys, CGS) or FILE.csv (units in the header); `-` is CSV on standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -37,6 +41,11 @@ pub struct Args {
 }
 
 static INTERRUPT: AtomicBool = AtomicBool::new(false);
+
+/// Reads a file, or standard input for `-`.
+fn read(path: &Path) -> std::io::Result<String> {
+    if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) }
+}
 
 /// Reads an experiment from a file or standard input, with settings.
 pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
@@ -54,7 +63,15 @@ pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
 }
 
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
-    let experiment = experiment::experiment(&source(&args.experiment, &args.settings)?)?;
+    let mut experiment = experiment::experiment(&source(&args.experiment, &args.settings)?)?;
+    if let Some(path) = &args.robot {
+        if path == Path::new("-") && args.experiment == path.as_path() {
+            return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
+        }
+        let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
+        let text = read(path).map_err(|error| bad(error.to_string()))?;
+        experiment.robot.bodies = Some(export::bodies(&text, &experiment.robot).map_err(|error| bad(error.to_string()))?);
+    }
     let output = args.out.as_deref().map(Output::open).transpose()?;
     let state_file = args.save_state.as_deref().map(pending).transpose()?;
     let mut engine = experiment.engine()?;

@@ -22,7 +22,7 @@ pub struct BulletEngine {
     body: BodyId,
     joint: PiezoJoint,
     motors_per_actuator: usize,
-    half_link_length: f64,
+    lengths: Vec<f64>,
     time_step: f64,
     stable_step: f64,
     step: u64,
@@ -69,7 +69,7 @@ impl BulletEngine {
             body,
             joint: robot.joint(),
             motors_per_actuator: robot.motors_per_actuator,
-            half_link_length: robot.half_link_length(),
+            lengths: robot.segments().iter().map(|segment| segment.length).collect(),
             time_step,
             stable_step: analytic::stable_step(robot),
             step: 0,
@@ -172,17 +172,15 @@ impl Engine for BulletEngine {
 
     /// The base's pose is current; the joints' positions, and the right end that hangs on the last of them, come from transforms
     /// that Bullet cached one step earlier. Velocities pair the joints' places with the velocities of the links' centres of mass,
-    /// and the right end's takes a whole half-link as lever from there. All of this is how the reference records.
+    /// and the right end's takes a whole length of the last body as lever from there. All of this is how the reference records.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
         let base = self.world.base_state(self.body)?;
         if let Some(&value) = base.position.iter().chain(&base.velocity).find(|v| !v.is_finite()) {
             return Err(self.not_finite("the base's position or velocity".into(), value));
         }
         self.world.link_states(self.body, &mut self.links)?;
-        let half = self.half_link_length;
-
         let p = base_pitch(&base);
-        let lever = half / 2.0;
+        let lever = 0.5 * self.lengths[0];
         let rate = base.angular_velocity[1];
         positions[..3].copy_from_slice(&[base.position[0] - lever * p.cos(), 0.0, base.position[2] + lever * p.sin()]);
         velocities[..3].copy_from_slice(&[
@@ -194,7 +192,7 @@ impl Engine for BulletEngine {
         let joints = self.links.len();
         for (i, link) in self.links.iter().enumerate() {
             // The joint stands half the link's length before its centre of mass, along the link's x axis.
-            let to_com = if i + 1 == joints { 0.5 * half } else { half };
+            let to_com = 0.5 * self.lengths[i + 1];
             for axis in 0..3 {
                 positions[3 * (i + 1) + axis] = link.position[axis] - link.rotation[axis][0] * to_com;
                 velocities[3 * (i + 1) + axis] = link.velocity[axis];
@@ -203,14 +201,15 @@ impl Engine for BulletEngine {
 
         let last = &self.links[joints - 1];
         let p = pitch([last.rotation[0][0], last.rotation[1][0], last.rotation[2][0]]);
+        let length = self.lengths[joints];
         let rate = last.angular_velocity[1];
         let joint = [positions[3 * joints], 0.0, positions[3 * joints + 2]];
         let end = 3 * (joints + 1);
-        positions[end..end + 3].copy_from_slice(&[joint[0] + half * p.cos(), 0.0, joint[2] - half * p.sin()]);
+        positions[end..end + 3].copy_from_slice(&[joint[0] + length * p.cos(), 0.0, joint[2] - length * p.sin()]);
         velocities[end..end + 3].copy_from_slice(&[
-            last.velocity[0] - half * p.sin() * rate,
+            last.velocity[0] - length * p.sin() * rate,
             0.0,
-            last.velocity[2] - half * p.cos() * rate,
+            last.velocity[2] - length * p.cos() * rate,
         ]);
         Ok(())
     }

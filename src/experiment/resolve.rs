@@ -117,6 +117,7 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
             film: choose("robot.friction.film", f.film.as_deref(), Film::BothEnds, &films)?,
             film_fraction: f.film_fraction.unwrap_or(0.5),
         },
+        bodies: None,
     })
 }
 

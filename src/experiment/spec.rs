@@ -15,7 +15,7 @@ impl Experiment {
             Damping::Eta(eta) => (Some(eta), None),
             Damping::Time(time) => (None, Some(time)),
         };
-        json!({
+        let mut spec = json!({
             "material": {
                 "actuator_length": m.actuator_length, "width": m.width, "gravity": m.gravity,
                 "piezo_modulus": m.piezo_modulus, "piezo_poisson": m.piezo_poisson,
@@ -42,7 +42,11 @@ impl Experiment {
             "time_step": self.time_step,
             "steps": self.steps,
             "record_every_steps": self.record_every,
-        })
+        });
+        if let Some(bodies) = &self.robot.bodies {
+            spec["bodies"] = bodies.iter().map(|b| json!({"length": b.length, "mass": b.mass, "friction": b.friction})).collect();
+        }
+        spec
     }
 
     fn drive_spec(&self) -> Value {

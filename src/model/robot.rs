@@ -86,6 +86,8 @@ pub struct Robot {
     pub positive_gain: f64,
     /// Friction coefficients and films.
     pub friction: Friction,
+    /// The N·m + 1 bodies, where they were read from a file instead of following from the fields above.
+    pub bodies: Option<Vec<Segment>>,
 }
 
 /// One body of the chain: a box of `length` × width × thickness.
@@ -135,6 +137,9 @@ impl Robot {
     /// The N·m + 1 bodies from left to right. The first and last are half as long and heavy as the others, so that the joints
     /// stand at the middle of the pieces they represent.
     pub fn segments(&self) -> Vec<Segment> {
+        if let Some(bodies) = &self.bodies {
+            return bodies.clone();
+        }
         let m = self.motors_per_actuator as f64;
         let mass = Laminate::new(&self.material).actuator_mass;
         let count = self.joints() + 1;
@@ -194,6 +199,15 @@ impl Robot {
         {
             ModelError::unless(value.is_finite() && value > 0.0, key, value, "positive")?;
         }
+        if let Some(bodies) = &self.bodies {
+            let count = bodies.len() as f64;
+            ModelError::unless(
+                bodies.len() == self.joints() + 1,
+                "robot.motors_per_actuator",
+                count - 1.0,
+                "as many joints as the bodies read",
+            )?;
+        }
         let fraction = self.friction.film_fraction;
         ModelError::unless(fraction.is_finite() && fraction >= 0.0, "robot.friction.film_fraction", fraction, "zero or more")?;
         let films = match self.friction.film {
@@ -225,6 +239,7 @@ mod tests {
             collision_thickness: 0.1,
             positive_gain: 1.0,
             friction: Friction { ground: 1.0, low: 0.2, high: 4.0, film, film_fraction: 0.5 },
+            bodies: None,
         }
     }
 

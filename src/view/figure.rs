@@ -390,7 +390,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
 }
 
 /// Text as it may stand in XML. Control characters, which XML does not allow, are left out.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -7,6 +7,7 @@ mod player;
 mod recordings;
 mod results;
 
+pub(crate) use figure::escape;
 pub use figure::{Figure, Mark};
 pub use gif::gif;
 pub use heatmap::{Categories, colour, heat_map};
