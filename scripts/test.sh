@@ -2,7 +2,8 @@
 # All set-up and all tests, on a fresh Debian 12 with Rust.
 #
 #   bash scripts/test.sh          the tests of `cargo test`, the live PyBullet check among them
-#   bash scripts/test.sh --long   besides: the shim under sanitizers, a run under valgrind, the refusal of a machine without Bullet
+#   bash scripts/test.sh --long   besides: the shim under sanitizers, a run under valgrind, the whole reproduction of
+#                                 the paper (some minutes), the refusal of a machine without Bullet
 #
 # CI sets CI=true, which means --long.
 set -euo pipefail
@@ -25,6 +26,8 @@ if $long; then
   bash scripts/sanitize.sh
   step "one short run under valgrind"
   bash scripts/valgrind.sh
+  step "the whole paper"
+  cargo run --release --locked --quiet -- reproduce --quick --out target/paper
   step "a build without Bullet names the Debian package"
   bash scripts/no_bullet.sh
 fi

@@ -4,7 +4,8 @@
 //!
 //! [`model`] turns a laminate's layers into a beam and the beam into a chain of links and hinges; [`drive`] gives every actuator a voltage
 //! in time; [`actuator`] turns angle, rate and voltage of a joint into its torque; an [`engine`] steps the chain; an
-//! [`experiment`] runs the loop and fills a [`recording`], from which measures are taken. [`sweep`] does so over a grid of values; [`view`] draws; [`export`] writes the robots for other simulators. [`crosscheck`] compares a recording with the
+//! [`experiment`] runs the loop and fills a [`recording`], from which measures are taken. [`sweep`] does so over a grid of values; [`view`] draws; [`export`] writes the robots for other simulators; [`reproduce`] puts
+//! the paper's results beside ours. [`crosscheck`] compares a recording with the
 //! published simulator's, number by number. [`bullet`] is the safe layer over the physics library, [`analytic`] holds closed forms.
 //!
 //! # Units and frame
@@ -70,6 +71,7 @@ pub mod export;
 mod files;
 pub mod model;
 pub mod recording;
+pub mod reproduce;
 pub mod sweep;
 pub mod view;
 

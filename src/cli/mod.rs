@@ -6,6 +6,7 @@ mod export;
 mod output;
 mod plot;
 mod presets;
+mod reproduce;
 mod run;
 mod sweep;
 
@@ -51,6 +52,7 @@ enum Command {
     Mjcf(export::Args),
     Animate(animate::Args),
     Crosscheck(crosscheck::Args),
+    Reproduce(reproduce::Args),
     /// List the built-in experiments.
     Presets,
     /// Print a built-in experiment, to start from.
@@ -180,6 +182,7 @@ pub fn main() -> ExitCode {
         Command::Mjcf(args) => export::run(export::Format::Mjcf, &args, options),
         Command::Plot(args) => plot::run(&args, options),
         Command::Animate(args) => animate::run(&args, options),
+        Command::Reproduce(args) => reproduce::run(&args, options),
         Command::Crosscheck(args) => crosscheck::run(&args, options),
         Command::Presets => presets::list(options),
         Command::Preset { name } => presets::show(&name),

@@ -75,7 +75,7 @@ pub fn run(
     let mut done = engine.step();
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
     while done < experiment.steps {
-        if done % OBSERVE_EVERY == 0 && observe(done) == Control::Stop {
+        if done.is_multiple_of(OBSERVE_EVERY) && observe(done) == Control::Stop {
             interrupted = true;
             break;
         }

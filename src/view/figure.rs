@@ -119,7 +119,8 @@ impl Figure {
     pub fn svg(&self) -> String {
         let all = || self.series.iter().flat_map(|s| &s.points).copied().filter(|p| shown(*p));
         let mut x = Scale::over(all().map(|p| p.0));
-        let mut y = Scale::over(all().map(|p| p.1).chain(self.horizontals.iter().copied()));
+        let notes = self.notes.iter().filter(|note| shown((note.0, note.1))).map(|note| note.1);
+        let mut y = Scale::over(all().map(|p| p.1).chain(self.horizontals.iter().copied()).chain(notes));
         let [left, mut right, top, bottom] = MARGINS;
         let mut height = HEIGHT;
         if self.equal_aspect {

@@ -1,0 +1,263 @@
+//! The paper's results beside this program's: one id each, a table and a figure each, one page for all.
+
+mod cantilever;
+mod jumping;
+mod page;
+mod walking;
+
+pub use page::{page, table};
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::engine::EngineError;
+use crate::experiment::{self, ConfigError, Control, Experiment, Run, Source, presets};
+use crate::sweep::{self, Row as Point, RowError, Rows, Sweep};
+
+/// How carefully a study is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// At the presets' steps.
+    Quick,
+    /// At a fifth of the presets' steps.
+    Full,
+}
+
+/// A study that cannot be finished.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StudyError {
+    /// A built-in experiment is wrong, which is a fault of this program.
+    #[error("{0}; please report this")]
+    Config(#[from] ConfigError),
+    /// A simulation failed.
+    #[error("{0}")]
+    Engine(#[from] EngineError),
+    /// A run went wrong in a way that makes its numbers worthless.
+    #[error("{0}")]
+    Trouble(String),
+    /// Results could not be kept.
+    #[error("{0}")]
+    Rows(#[from] RowError),
+    /// The user stopped it.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// One published result beside ours.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Comparison {
+    /// What is compared.
+    pub quantity: String,
+    /// As published, and how it was had.
+    pub published: String,
+    /// As simulated here.
+    pub ours: String,
+    /// The difference.
+    pub difference: String,
+    /// What explains it, or what is not specified.
+    pub explanation: String,
+}
+
+/// What a study found.
+#[derive(Debug, Clone, Default)]
+pub struct Findings {
+    /// The table.
+    pub comparisons: Vec<Comparison>,
+    /// The figure, as SVG.
+    pub figure: String,
+    /// What the figure shows, in a sentence or two.
+    pub caption: String,
+}
+
+impl Findings {
+    fn compare(
+        &mut self,
+        quantity: &str,
+        published: &str,
+        ours: impl Into<String>,
+        difference: impl Into<String>,
+        explanation: &str,
+    ) {
+        self.comparisons.push(Comparison {
+            quantity: quantity.into(),
+            published: published.into(),
+            ours: ours.into(),
+            difference: difference.into(),
+            explanation: explanation.into(),
+        });
+    }
+}
+
+impl Findings {
+    /// Says which frequencies of a scan gave no result, and why.
+    fn without_result(&mut self, points: &[(f64, f64)]) {
+        let lost: Vec<String> = points.iter().filter(|p| !p.1.is_finite()).map(|p| format!("{}", p.0)).collect();
+        if !lost.is_empty() {
+            self.compare(
+                "frequencies without a result",
+                "–",
+                format!("{} Hz", lost.join(", ")),
+                "",
+                "There Bullet's contact creates energy or a coordinate runs into Bullet's limit of 100 (cm/s or rad/s); such runs are refused. The rows on disk say which, when and where.",
+            );
+        }
+    }
+}
+
+/// One result of the paper.
+#[derive(Clone, Copy)]
+pub struct Study {
+    /// Name on the command line.
+    pub id: &'static str,
+    /// What it is.
+    pub title: &'static str,
+    /// Where it stands in the paper.
+    pub section: &'static str,
+    /// Processor time of the quick study (s), as measured; the full one takes five times as long.
+    pub quick_cost_s: f64,
+    run: fn(&Bench) -> Result<Findings, StudyError>,
+}
+
+impl Study {
+    /// Does the study.
+    ///
+    /// # Errors
+    /// [`StudyError`].
+    pub fn run(&self, bench: &Bench) -> Result<Findings, StudyError> {
+        (self.run)(bench)
+    }
+}
+
+/// All of them, in the paper's order.
+pub const STUDIES: [Study; 10] = [
+    Study {
+        id: "cantilever-shapes",
+        title: "Static shapes of the cantilever",
+        section: "III-A",
+        quick_cost_s: 2.0,
+        run: cantilever::shapes,
+    },
+    Study {
+        id: "cantilever-response",
+        title: "Frequency response of the cantilever",
+        section: "III-A",
+        quick_cost_s: 300.0,
+        run: cantilever::response,
+    },
+    Study {
+        id: "cantilever-damping",
+        title: "Damping from the step response",
+        section: "III-A",
+        quick_cost_s: 2.0,
+        run: cantilever::damping,
+    },
+    Study {
+        id: "robot-shapes",
+        title: "Static shapes of the five-actuator robot",
+        section: "III-B",
+        quick_cost_s: 3.0,
+        run: walking::shapes,
+    },
+    Study {
+        id: "inchworm",
+        title: "Inchworm motion over five cycles",
+        section: "III-B",
+        quick_cost_s: 20.0,
+        run: walking::inchworm,
+    },
+    Study { id: "jump-14hz", title: "In-place jumping at 14 Hz", section: "III-C", quick_cost_s: 4.0, run: jumping::at_14_hz },
+    Study {
+        id: "key-shapes-14hz",
+        title: "The three key shapes at 14 Hz",
+        section: "III-C",
+        quick_cost_s: 4.0,
+        run: jumping::key_shapes,
+    },
+    Study {
+        id: "jump-frequency",
+        title: "Jump height against frequency",
+        section: "III-C",
+        quick_cost_s: 60.0,
+        run: jumping::over_frequency,
+    },
+    Study {
+        id: "jump-on-time",
+        title: "Jump height against on-time",
+        section: "authors' notebook",
+        quick_cost_s: 22.0,
+        run: jumping::over_on_time,
+    },
+    Study { id: "speed", title: "Speed against frequency", section: "IV", quick_cost_s: 150.0, run: walking::speed },
+];
+
+/// Where studies are done: threads, folder, effort.
+pub struct Bench<'a> {
+    /// How carefully.
+    pub effort: Effort,
+    /// Threads.
+    pub jobs: usize,
+    /// Where sweeps keep their rows, so that an interrupted study goes on where it stopped.
+    pub folder: &'a Path,
+    /// Set to stop.
+    pub stop: &'a AtomicBool,
+}
+
+impl Bench<'_> {
+    /// Runs a preset with settings.
+    fn run(&self, preset: &str, settings: &[&str]) -> Result<(Experiment, Run), StudyError> {
+        let text = presets::find(preset).map_or("", |preset| preset.text);
+        let mut source = Source::from_text(preset, text);
+        for setting in settings {
+            source.set(setting)?;
+        }
+        let mut experiment = experiment::experiment(&source)?;
+        if self.effort == Effort::Full {
+            experiment.time_step /= 5.0;
+            experiment.steps *= 5;
+            experiment.record_every *= 5;
+        }
+        let observe = |_| if self.stop.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue };
+        let run = experiment::run(&experiment, &mut experiment.engine()?, observe)?;
+        if run.interrupted {
+            return Err(StudyError::Interrupted);
+        }
+        match run.trouble(&experiment).pop() {
+            Some(trouble) => Err(StudyError::Trouble(trouble)),
+            None => Ok((experiment, run)),
+        }
+    }
+
+    /// Runs a built-in sweep with settings of its experiment, and returns its points in the grid's order.
+    fn sweep(&self, id: &str, preset: &str, settings: &[&str]) -> Result<(Sweep, Vec<Point>), StudyError> {
+        let settings: Vec<String> = settings.iter().map(|setting| (*setting).to_owned()).collect();
+        self.points(id, Sweep::open(Path::new(&format!("preset:{preset}")), &settings)?)
+    }
+
+    /// The same of any sweep.
+    fn points(&self, id: &str, mut sweep: Sweep) -> Result<(Sweep, Vec<Point>), StudyError> {
+        if self.effort == Effort::Full {
+            sweep.refine(5)?;
+        }
+        let folder = self.folder.join(id);
+        let outcome = sweep::run(&sweep, &folder, (1, 1), self.jobs, self.stop, |_, _| {})?;
+        if outcome.interrupted {
+            return Err(StudyError::Interrupted);
+        }
+        sweep::merge(&folder, &sweep)?;
+        let points = Rows::open(&folder, &sweep, 1, 1)?.done().values().cloned().collect();
+        Ok((sweep, points))
+    }
+}
+
+/// The first measure of each point against the value of one axis.
+fn curve(sweep: &Sweep, points: &[Point], axis: usize, measure: usize) -> Vec<(f64, f64)> {
+    let value = |point: &Point| {
+        let value = sweep.point(point.index)[axis];
+        value.as_float().or_else(|| value.as_integer().map(|i| i as f64)).unwrap_or(f64::NAN)
+    };
+    points.iter().map(|point| (value(point), point.measures[measure].unwrap_or(f64::NAN))).collect()
+}
