@@ -88,6 +88,7 @@ fn json_is_one_object_with_a_schema_and_quiet_is_quiet() {
     struct Result {
         schema: u32,
         measures: std::collections::BTreeMap<String, f64>,
+        energy: std::collections::BTreeMap<String, Option<f64>>,
         steps: u64,
         records: usize,
         simulated_s: f64,
@@ -101,6 +102,7 @@ fn json_is_one_object_with_a_schema_and_quiet_is_quiet() {
     let result: Result = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((result.schema, result.steps, result.records), (1, 200, 5));
     assert!(result.measures["tip_deflection_mm"] < 0.0);
+    assert!(result.energy["electrical_in_erg"] > Some(0.0) && result.energy["fault"].is_none());
     assert!(output.stderr.is_empty());
 }
 
@@ -236,20 +238,8 @@ fn a_velocity_at_bullets_limit_is_reported_and_no_measures_are_given() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("limited a velocity to 100"));
     let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(result["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("limited")));
-    assert_eq!(result["measures"], serde_json::json!({}));
-}
-
-#[test]
-fn every_preset_can_be_printed_and_run() {
-    let bench = Bench::new(CANTILEVER);
-    let listed = out(&bench.sfers(&["presets"]));
-    let names: Vec<_> = listed.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    assert!(names.len() >= 17, "{listed}");
-    for name in names {
-        fs::write(bench.path("p.toml"), bench.sfers(&["preset", name]).stdout).unwrap();
-        let output = bench.sfers(&["run", "p.toml", "--quiet", "--set", "simulation.duration_s=1e-4"]);
-        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-    }
+    // All but the one that tells of the trouble.
+    assert_eq!(result["measures"].as_object().unwrap().keys().collect::<Vec<_>>(), ["energy_error"]);
 }
 
 #[test]

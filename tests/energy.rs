@@ -58,7 +58,7 @@ fn what_does_not_close_shrinks_with_the_step() {
 #[test]
 fn every_preset_keeps_its_books_in_order() {
     for preset in presets::PRESETS {
-        let energy = balance(preset.name, &["simulation.duration_s=0.12"]);
+        let energy = balance(preset.name, &["simulation.duration_s=0.12", "simulation.record_every_s=0.01"]);
         assert!(energy.fault.is_none() && energy.error() < 0.5 * ENERGY_TOLERANCE, "{}: {energy:?}", preset.name);
     }
 }

@@ -156,6 +156,15 @@ fn what_is_no_chain_is_refused_by_the_name_of_its_element() {
 }
 
 #[test]
+fn nesting_without_end_is_an_error_and_no_crash() {
+    let experiment = from_preset("cantilever-dc", &[]);
+    for depth in [1000, 100_000] {
+        let text = format!("<robot name=\"r\">{}{}</robot>", "<link name=\"a\">".repeat(depth), "</link>".repeat(depth));
+        assert!(export::bodies(&text, &experiment.robot).is_err());
+    }
+}
+
+#[test]
 fn the_command_exports_and_runs_a_file_and_refuses_a_bad_one() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| sfers(arguments, folder.path());

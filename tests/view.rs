@@ -100,6 +100,9 @@ fn a_gif_has_the_frames_of_its_length() {
         frames += 1;
     }
     assert_eq!(frames, 50);
+    // Of an experiment, which is run first, the film is the same.
+    bench.done(&["animate", "a.toml", "--speed", "0.1", "--out", "b.gif"]);
+    assert_eq!(fs::read(bench.path("a.gif")).unwrap(), fs::read(bench.path("b.gif")).unwrap());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use super::output::{finish, pending};
 use super::plot::extension;
 use super::{Failure, Options};
+use crate::experiment::{self, Control, Source};
 use crate::recording::npz;
 use crate::view;
 
@@ -14,7 +15,7 @@ use crate::view;
 /// Example: sfers animate jump.npz --out jump.html
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A recording FILE.npz, this program's or the reference's.
+    /// A recording FILE.npz, this program's or the reference's; or an experiment FILE.toml, which is run first.
     input: PathBuf,
     /// FILE.html or FILE.gif.
     #[arg(long, value_name = "FILE")]
@@ -34,7 +35,16 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         return Err(Failure::Usage(format!("{}: the name must end in .html or .gif", args.out.display())));
     }
     let file = pending(&args.out)?;
-    let recording = npz::read_file(&args.input)?;
+    let recording = match extension(&args.input) {
+        "toml" => {
+            let experiment = experiment::experiment(&Source::from_file(&args.input)?)?;
+            let run = experiment::run(&experiment, &mut experiment.engine()?, |_| Control::Continue)?;
+            // A film of a run that went wrong is worth seeing, but not without a word.
+            run.trouble(&experiment).iter().for_each(|trouble| eprintln!("warning: {trouble}"));
+            run.recording
+        }
+        _ => npz::read_file(&args.input)?,
+    };
     if recording.is_empty() {
         return Err(Failure::Data(format!("{}: holds no records", args.input.display())));
     }

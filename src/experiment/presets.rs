@@ -36,6 +36,7 @@ presets! {
     "full-frictional-inchworm"
     "full-inchworm"
     "inchworm"
+    "inchworm-1hz"
     "inchworm-backward"
     "inchworm-reversed"
     "jump-14hz"

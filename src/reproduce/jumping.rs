@@ -30,10 +30,11 @@ fn steps(recording: &Recording) -> Vec<(ContactState, f64)> {
         Some((last, whole)) if *last == state || length < shortest => *whole += length,
         _ => steps.push((state, length)),
     };
-    let mut all = Vec::new();
+    let mut all: Vec<(ContactState, f64)> = Vec::new();
     samples.for_each(|(state, length)| join(&mut all, state, length, 0.0));
     let mut steps = Vec::new();
-    all.into_iter().for_each(|(state, length)| join(&mut steps, state, length, 2e-3));
+    // Where the cut leaves less than that at the beginning, it is left out.
+    all.into_iter().skip_while(|step| step.1 < 2e-3).for_each(|(state, length)| join(&mut steps, state, length, 2e-3));
     steps
 }
 

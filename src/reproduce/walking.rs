@@ -39,9 +39,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
 }
 
 pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
-    let mut settings = REAL.to_vec();
-    settings.extend(["drive.frequency_hz=1", "simulation.duration_s=5", "simulation.record_every_s=0.01"]);
-    let (_, run) = bench.run("full-frictional-inchworm", &settings)?;
+    let (_, run) = bench.run("inchworm-1hz", &[])?;
     let r = &run.recording;
     let stride = Measures::of(r, Mount::Ground, Some(1.0)).stride_mm.unwrap_or(f64::NAN);
     let mut findings = Findings::default();
