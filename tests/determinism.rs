@@ -15,14 +15,14 @@ fn jump() -> Experiment {
 
 /// All bits of a run, as one list.
 fn bits(experiment: &Experiment) -> Vec<u64> {
-    let run = experiment::run(experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap();
+    let run = experiment::run(experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
     let r = run.recording;
     let arrays = [r.time, r.angles, r.rates, r.torques, r.motor_voltages, r.positions, r.velocities];
     arrays.iter().flatten().map(|value| value.to_bits()).collect()
 }
 
 /// Steps an engine from `from` to `to`, with the loop of `experiment::run`.
-fn advance(experiment: &Experiment, engine: &mut BulletEngine, from: u64, to: u64) -> Vec<u64> {
+fn advance(experiment: &Experiment, engine: &mut dyn Engine, from: u64, to: u64) -> Vec<u64> {
     let mut voltages = vec![0.0; experiment.robot.actuators];
     let mut bits = Vec::new();
     for step in from..to {
@@ -69,24 +69,24 @@ fn a_snapshot_restored_in_the_middle_of_a_jump_goes_on_with_the_same_bits() {
     // On the ground with contacts, in the air, and back on the ground.
     for at in [4500, 7000, 9500] {
         let mut engine = experiment.engine().unwrap();
-        advance(&experiment, &mut engine, 0, at);
+        advance(&experiment, engine.as_mut(), 0, at);
         let state = engine.save().unwrap();
-        let on = advance(&experiment, &mut engine, at, at + 2500);
+        let on = advance(&experiment, engine.as_mut(), at, at + 2500);
 
         engine.load(at, &state).unwrap();
         assert_eq!(engine.step(), at);
-        assert!(advance(&experiment, &mut engine, at, at + 2500) == on, "the same engine, step {at}");
+        assert!(advance(&experiment, engine.as_mut(), at, at + 2500) == on, "the same engine, step {at}");
 
         let mut fresh = experiment.engine().unwrap();
         fresh.load(at, &state).unwrap();
-        assert!(advance(&experiment, &mut fresh, at, at + 2500) == on, "a fresh engine, step {at}");
+        assert!(advance(&experiment, fresh.as_mut(), at, at + 2500) == on, "a fresh engine, step {at}");
     }
 }
 
 #[test]
 fn the_snapshots_of_that_test_are_of_a_robot_on_the_ground_and_in_the_air() {
     let experiment = jump();
-    let mut engine = experiment.engine().unwrap();
+    let mut engine = BulletEngine::new(&experiment.robot, experiment.time_step).unwrap();
     let mut contacts = Vec::new();
     let mut counts = Vec::new();
     let mut from = 0;

@@ -12,7 +12,7 @@ fn experiment_of(text: &str, settings: &[&str]) -> Experiment {
 }
 
 fn run(experiment: &Experiment) -> Run {
-    experiment::run(experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap()
+    experiment::run(experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap()
 }
 
 fn balance(preset: &str, settings: &[&str]) -> EnergyBalance {

@@ -22,7 +22,7 @@ fn sfers(arguments: &[&str], folder: &Path) -> Output {
 
 /// All bits of a short run.
 fn bits(experiment: &Experiment) -> Vec<u64> {
-    let run = experiment::run(experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap();
+    let run = experiment::run(experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
     let r = run.recording;
     [r.angles, r.rates, r.torques, r.positions, r.velocities].iter().flatten().map(|value| value.to_bits()).collect()
 }

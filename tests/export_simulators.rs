@@ -90,7 +90,7 @@ fn mujoco_loads_urdf_and_mjcf_and_its_cantilever_bends_and_rings_alike() {
     assert!((answer["urdf_mass"].as_f64().unwrap() / (mass - ringing.robot.segments()[0].mass) - 1.0).abs() < 1e-9, "{answer}");
 
     let measure = |experiment: &Experiment, name: &str| {
-        let run = experiment::run(experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap();
+        let run = experiment::run(experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
         Measures::of(&run.recording, Mount::Clamped, None).get(name).unwrap()
     };
     let relative = |key: &str, ours: f64| (answer[key].as_f64().unwrap() / ours - 1.0).abs();

@@ -94,7 +94,7 @@ fn twenty_random_robots_have_equal_bits_on_a_live_pybullet() {
                     let Some((i, experiment)) = queue.lock().unwrap().next() else { break };
                     let (theirs, versions) = run_pybullet(&experiment, &python).unwrap();
                     assert_eq!(versions.pybullet, "3.2.7");
-                    let run = experiment::run(&experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap();
+                    let run = experiment::run(&experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
                     let report = compare(&run.recording, &theirs);
                     if !report.passes {
                         let differing: Vec<_> = report.quantities.iter().filter(|q| !q.passes).collect();

@@ -11,7 +11,7 @@ fn record(preset: &str, settings: &[&str]) -> Recording {
         source.set(setting).unwrap();
     }
     let experiment = experiment::experiment(&source).unwrap();
-    experiment::run(&experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap().recording
+    experiment::run(&experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap().recording
 }
 
 #[test]

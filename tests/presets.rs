@@ -17,7 +17,7 @@ fn sfers(arguments: &[&str]) -> Output {
 fn begins(name: &str, mut experiment: Experiment) {
     experiment.steps = 200;
     experiment.record_every = 20;
-    let run = experiment::run(&experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap();
+    let run = experiment::run(&experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
     assert_eq!(run.recording.len(), 11, "{name}");
     assert!(run.trouble(&experiment).is_empty(), "{name}");
     let measures = Measures::of(&run.recording, experiment.robot.mount, experiment.drive.period());

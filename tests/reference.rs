@@ -11,7 +11,7 @@ fn check(offset: usize) {
     for builtin in BUILTIN.iter().skip(offset).step_by(2) {
         let experiment = experiment::experiment(&Source::from_text(builtin.name, builtin.experiment)).unwrap();
         let theirs = npz::read(builtin.recording, builtin.name.as_ref()).unwrap();
-        let ours = experiment::run(&experiment, &mut experiment.engine().unwrap(), |_| Control::Continue).unwrap();
+        let ours = experiment::run(&experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
         let report = compare(&ours.recording, &theirs);
         assert!(report.passes, "{}: {report:#?}", builtin.name);
         // compare() takes +0 and -0 for equal; beyond that the bits are.

@@ -38,7 +38,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let recording = match extension(&args.input) {
         "toml" => {
             let experiment = experiment::experiment(&Source::from_file(&args.input)?)?;
-            let run = experiment::run(&experiment, &mut experiment.engine()?, |_| Control::Continue)?;
+            let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
             // A film of a run that went wrong is worth seeing, but not without a word.
             run.trouble(&experiment).iter().for_each(|trouble| eprintln!("warning: {trouble}"));
             run.recording

@@ -117,7 +117,7 @@ fn check(item: Item, args: &Args) -> Result<Outcome, Failure> {
         }
         (None, None, None) => return Err(Failure::Usage("there is nothing to compare with".into())),
     };
-    let ours = experiment::run(&experiment, &mut experiment.engine()?, |_| Control::Continue)?.recording;
+    let ours = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?.recording;
     Ok(Outcome { name, against, report: compare(&ours, &theirs) })
 }
 

@@ -76,7 +76,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let state_file = args.save_state.as_deref().map(pending).transpose()?;
     let mut engine = experiment.engine()?;
     if let Some(path) = &args.load_state {
-        load_state(path, &experiment, &mut engine)?;
+        load_state(path, &experiment, engine.as_mut())?;
     }
 
     let mut warnings = Vec::new();
@@ -91,7 +91,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let first_step = engine.step();
     let bar = progress(&experiment, options);
     let start = Instant::now();
-    let result = experiment::run(&experiment, &mut engine, |done| {
+    let result = experiment::run(&experiment, engine.as_mut(), |done| {
         bar.set_position(done);
         if INTERRUPT.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
     });
@@ -126,7 +126,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);
     if let Some(file) = state_file {
-        let state = SavedState::of(&experiment, &engine)?;
+        let state = SavedState::of(&experiment, engine.as_ref())?;
         let text = serde_json::to_string(&state).map_err(|error| unwritable(file.path(), &error))?;
         finish(file, text.as_bytes())?;
     }

@@ -214,7 +214,7 @@ impl Engine for BulletEngine {
         Ok(())
     }
 
-    fn base(&self) -> Result<PlanarBase, EngineError> {
+    fn base(&mut self) -> Result<PlanarBase, EngineError> {
         let base = self.world.base_state(self.body)?;
         let plane = |v: [f64; 3]| [v[0], v[2]];
         Ok(PlanarBase {

@@ -47,6 +47,8 @@ pub struct EnergyBalance {
     pub electrical_in_erg: f64,
     /// Heat in the joints.
     pub damping_out_erg: f64,
+    /// What the time stepping is known to have taken: the planar engine's damping of what alternates from step to step.
+    pub numerical_out_erg: f64,
     /// What friction, impacts and the clamp took out: all falls of the contact's account.
     pub contact_out_erg: f64,
     /// What contact gave: all rises of the same account. Time steps and soft contact make small ones that fall back at once.
@@ -117,6 +119,7 @@ pub struct Books {
     before: JointState,
     begun: bool,
     ground_energy: f64,
+    numerical_before: f64,
     account: f64,
     lowest: f64,
     /// Work of contact on each link since the account was lowest, in samples.
@@ -145,6 +148,7 @@ impl Books {
             before: JointState::default(),
             begun: false,
             ground_energy: 0.0,
+            numerical_before: 0.0,
             account: 0.0,
             lowest: 0.0,
             gained: vec![0.0; count],
@@ -165,10 +169,16 @@ impl Books {
             let b = &self.before;
             let mut electrical = 0.0;
             let mut heat = 0.0;
+            let midpoint = engine.midpoint();
             for i in 0..joints.rates.len() {
-                let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
+                let (turn, rate) = if midpoint {
+                    let turn = joints.angles[i] - b.angles[i];
+                    (turn, turn / self.time_step)
+                } else {
+                    (0.5 * (b.rates[i] + joints.rates[i]) * self.time_step, b.rates[i])
+                };
                 electrical += self.joint.rest_angle_per_volt * b.motor_voltages[i] * turn;
-                heat += b.rates[i] * turn;
+                heat += rate * turn;
             }
             self.balance.electrical_in_erg += k * electrical;
             self.balance.damping_out_erg += k * eta * heat;
@@ -192,10 +202,12 @@ impl Books {
         self.move_bodies(&engine.base()?);
         let sum = |of: &dyn Fn(&Body, &Motion) -> f64| self.bodies.iter().zip(&self.motions).map(|(b, m)| of(b, m)).sum::<f64>();
         let kinetic = sum(&|b, m| 0.5 * (b.mass * (m.velocity[0].powi(2) + m.velocity[1].powi(2)) + b.inertia * m.rate.powi(2)));
+        let kinetic = engine.kinetic_energy().unwrap_or(kinetic);
         let height = sum(&|b, m| b.mass * self.gravity * m.centre[1]);
         let elastic = 0.5 * self.joint.stiffness * self.before.angles.iter().map(|a| a * a).sum::<f64>();
         if !self.begun {
             self.ground_energy = height;
+            self.numerical_before = engine.numerical_loss();
         }
         let b = &mut self.balance;
         b.kinetic_erg = kinetic;
@@ -204,7 +216,8 @@ impl Books {
         let mechanical = kinetic + b.gravitational_erg + elastic;
         // A robot that falls or sags from rest has energies that add up to nothing.
         b.largest_erg = b.largest_erg.max(kinetic + elastic + b.gravitational_erg.abs());
-        let account = mechanical - b.electrical_in_erg + b.damping_out_erg;
+        b.numerical_out_erg = engine.numerical_loss() - self.numerical_before;
+        let account = mechanical - b.electrical_in_erg + b.damping_out_erg + b.numerical_out_erg;
         if !self.begun {
             (self.account, self.lowest) = (account, account);
             return Ok(());

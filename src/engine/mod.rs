@@ -6,9 +6,11 @@
 
 mod bullet;
 mod energy;
+mod planar;
 
 pub use bullet::BulletEngine;
 pub use energy::{Books, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
+pub use planar::PlanarEngine;
 
 use thiserror::Error;
 
@@ -25,6 +27,19 @@ pub enum EngineError {
     /// Bullet refused a call.
     #[error(transparent)]
     Bullet(#[from] BulletError),
+    /// The contact problem of a step was not solved.
+    #[error("contact was not solved in {iterations} iterations at step {step}, t = {time} s; try a smaller time step")]
+    NotConverged {
+        /// Iterations done.
+        iterations: u32,
+        /// The step, counting from 0.
+        step: u64,
+        /// The time of the step (s).
+        time: f64,
+    },
+    /// A saved state that is not one of this robot.
+    #[error("the state does not fit this robot")]
+    State,
     /// A coordinate is no longer a number.
     #[error("the simulation diverged: {what} is {value} at step {step}, t = {time} s; try a time step below {stable_step:.3e} s")]
     NotFinite {
@@ -97,7 +112,7 @@ pub trait Engine {
     ///
     /// # Errors
     /// Whatever the engine's library reports.
-    fn base(&self) -> Result<PlanarBase, EngineError>;
+    fn base(&mut self) -> Result<PlanarBase, EngineError>;
 
     /// Reads the forces of the floor into `contacts`, which is cleared first.
     ///
@@ -111,6 +126,11 @@ pub trait Engine {
     /// Whatever the engine's library reports.
     fn advance(&mut self) -> Result<(), EngineError>;
 
+    /// Energy that the engine's time stepping is known to have taken since the engine was built (erg).
+    fn numerical_loss(&self) -> f64 {
+        0.0
+    }
+
     /// Everything that a later step depends on, as numbers for storing.
     ///
     /// # Errors
@@ -122,6 +142,17 @@ pub trait Engine {
     /// # Errors
     /// If the numbers are not a state of this robot; nothing is changed then.
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError>;
+
+    /// Whether drive, springs and dampers act at the middle of a step. Otherwise they act as in the reference: at its start, with the
+    /// voltages of the step before.
+    fn midpoint(&self) -> bool {
+        false
+    }
+
+    /// Kinetic energy (erg), where it is more exactly known than from the motion of base and joints.
+    fn kinetic_energy(&self) -> Option<f64> {
+        None
+    }
 
     /// Number of steps taken.
     fn step(&self) -> u64;

@@ -16,7 +16,7 @@ pub use run::{Control, Run, run};
 pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};
-use crate::engine::{BulletEngine, EngineError};
+use crate::engine::{BulletEngine, Engine, EngineError, PlanarEngine};
 use crate::model::{Mount, Robot};
 use crate::recording::{GroundMeta, Meta};
 
@@ -28,7 +28,7 @@ use crate::recording::{GroundMeta, Meta};
 /// let mut source = Source::from_text("preset", experiment::presets::find("cantilever-dc").unwrap().text);
 /// source.set("simulation.duration_s=0.001")?;
 /// let experiment = experiment::experiment(&source)?;
-/// let run = experiment::run(&experiment, &mut experiment.engine()?, |_| Control::Continue)?;
+/// let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
 /// assert_eq!(run.recording.joints(), 3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -44,8 +44,19 @@ pub struct Experiment {
     pub steps: u64,
     /// A record is taken every so many steps, and at the first and last.
     pub record_every: u64,
+    /// What steps the robot.
+    pub engine: EngineKind,
     /// The keys as they were given.
     pub config: Config,
+}
+
+/// The engines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EngineKind {
+    /// Bullet, bit for bit as the reference.
+    Bullet,
+    /// The fast one in the plane.
+    Planar,
 }
 
 impl Experiment {
@@ -53,8 +64,11 @@ impl Experiment {
     ///
     /// # Errors
     /// [`EngineError`] if the robot cannot be built.
-    pub fn engine(&self) -> Result<BulletEngine, EngineError> {
-        BulletEngine::new(&self.robot, self.time_step)
+    pub fn engine(&self) -> Result<Box<dyn Engine>, EngineError> {
+        Ok(match self.engine {
+            EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
+            EngineKind::Planar => Box::new(PlanarEngine::new(&self.robot, self.time_step)?),
+        })
     }
 
     /// Whether the state before step `step` is recorded: `(step + 1)` a multiple of the interval, or the first or last step.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::config::{Config, ConfigError, DriveConfig, Fault, PhaseConfig, Source};
-use super::{Experiment, drive_csv};
+use super::{EngineKind, Experiment, drive_csv};
 use crate::drive::gait::{self, Parameter};
 use crate::drive::{Drive, Waveform};
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
@@ -47,7 +47,9 @@ fn resolve(config: &Config, folder: &Path) -> Result<Experiment, Trouble> {
     let (time_step, steps, record_every) = simulation(config, &robot)?;
     let waveform = waveform(&config.drive, &robot, time_step, folder)?;
     let drive = Drive { waveform, positive_gain: robot.positive_gain };
-    Ok(Experiment { robot, drive, time_step, steps, record_every, config: config.clone() })
+    let engines = [("bullet", EngineKind::Bullet), ("planar", EngineKind::Planar)];
+    let engine = choose("simulation.engine", config.simulation.engine.as_deref(), EngineKind::Bullet, &engines)?;
+    Ok(Experiment { robot, drive, time_step, steps, record_every, engine, config: config.clone() })
 }
 
 fn choose<T: Copy>(key: &str, value: Option<&str>, default: T, choices: &[(&str, T)]) -> Result<T, Fault> {
@@ -124,7 +126,6 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
 /// Time step (s), number of steps, and steps between records.
 fn simulation(config: &Config, robot: &Robot) -> Result<(f64, u64, u64), Fault> {
     let s = &config.simulation;
-    choose("simulation.engine", s.engine.as_deref(), (), &[("bullet", ())])?;
     let positive = |key: &str, value: f64| {
         if value.is_finite() && value > 0.0 {
             Ok(value)

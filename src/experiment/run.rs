@@ -71,6 +71,7 @@ pub fn run(
     let mut recorder = Recorder::new(experiment);
     let mut books = Books::new(&experiment.robot, experiment.time_step);
     let mut voltages = vec![0.0; experiment.robot.actuators];
+    let midpoint = engine.midpoint();
     let mut interrupted = false;
     let mut done = engine.step();
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
@@ -79,8 +80,10 @@ pub fn run(
             interrupted = true;
             break;
         }
-        experiment.drive.voltages(time, &mut voltages);
+        let before = time;
         time = done as f64 * experiment.time_step;
+        let half = 0.5 * experiment.time_step;
+        experiment.drive.voltages(if midpoint { time + half } else { before }, &mut voltages);
         engine.prepare(&voltages)?;
         books.take(engine)?;
         if experiment.records(done) {

@@ -221,7 +221,7 @@ impl Bench<'_> {
             experiment.record_every *= 5;
         }
         let observe = |_| if self.stop.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue };
-        let run = experiment::run(&experiment, &mut experiment.engine()?, observe)?;
+        let run = experiment::run(&experiment, experiment.engine()?.as_mut(), observe)?;
         if run.interrupted {
             return Err(StudyError::Interrupted);
         }

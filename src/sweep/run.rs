@@ -76,7 +76,7 @@ fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Option<
     let run = sweep.experiment(index).map_err(|error| error.to_string()).and_then(|experiment| {
         let mut engine = experiment.engine().map_err(|error| error.to_string())?;
         let observe = |_| if given_up() { Control::Stop } else { Control::Continue };
-        let run = experiment::run(&experiment, &mut engine, observe).map_err(|error| error.to_string())?;
+        let run = experiment::run(&experiment, engine.as_mut(), observe).map_err(|error| error.to_string())?;
         Ok((experiment, run))
     });
     let none = vec![None; sweep.measures.len()];

@@ -1,0 +1,214 @@
+//! One corner on the floor: the law of contact and the linear piece of it that a state stands for.
+//!
+//! Per corner, with the cone K = {|x| ≤ μ z}, compliance R, velocity w and target w*:
+//!
+//! ```text
+//! λ = P_K((w* − w)/R)         the gradient of  −R/2 |λ|²  in w: convex, with four linear pieces
+//! ```
+
+use super::recursion::{Articulated, Spatial};
+
+/// Softness of contact as a share of the robot's inverse mass: a resting robot gives way by 10⁻⁷ cm/s.
+const SOFTNESS: f64 = 1e-6;
+/// Speed (cm/s) at which something could come down from the height that is looked at.
+const FASTEST: f64 = 400.0;
+/// Share of a penetration that is pushed out per step, and the largest speed of it (cm/s): so slow that it makes no energy to speak of.
+const PUSH_OUT: f64 = 0.1;
+const PUSH_OUT_SPEED: f64 = 0.01;
+
+/// What all corners share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Law {
+    time_step: f64,
+    /// Share of the step's end in the mean motion.
+    weight: f64,
+    /// 1/R (g).
+    stiffness: f64,
+}
+
+impl Law {
+    pub(super) fn new(time_step: f64, weight: f64, mass: f64) -> Self {
+        Self { time_step, weight, stiffness: mass / SOFTNESS }
+    }
+}
+
+/// State of a corner: the linear piece of the law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Touch {
+    #[default]
+    Open,
+    Stick,
+    /// Pushed by the floor towards +x.
+    SlideForward,
+    /// Pushed by the floor towards −x.
+    SlideBackward,
+}
+
+/// One bottom corner.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Corner {
+    /// From the body's reference point (cm).
+    pub(super) arm: [f64; 2],
+    /// Whether it may touch during this step.
+    pub(super) near: bool,
+    touch: Touch,
+    friction: f64,
+    /// Mean velocity w* that stops it on the floor at the end (cm/s).
+    target: [f64; 2],
+    /// Mean velocity of the iterate (cm/s).
+    velocity: [f64; 2],
+    /// Mean velocity of the newest solution, less the iterate's.
+    step: [f64; 2],
+    /// Impulse of the floor on it (dyn·s), times the weight.
+    impulse: [f64; 2],
+}
+
+impl Corner {
+    /// Looks at the corner at `arm` from its body's reference point, `gap` (cm) above the floor.
+    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, friction: f64, law: &Law) -> bool {
+        self.arm = arm;
+        self.near = gap < FASTEST * law.time_step;
+        self.friction = friction;
+        self.impulse = [0.0; 2];
+        if !self.near {
+            self.touch = Touch::Open;
+            return false;
+        }
+        self.target[1] = if gap > 0.0 { -gap / law.time_step } else { (-PUSH_OUT * gap / law.time_step).min(PUSH_OUT_SPEED) };
+        true
+    }
+
+    /// Turns the target for the end of the step into one for the mean, from the velocity `before` (cm/s) the step.
+    pub(super) fn begin(&mut self, before: [f64; 2], law: &Law) {
+        let ahead = self.target[1];
+        self.target = [before[0] * (1.0 - law.weight), before[1] + law.weight * (ahead - before[1])];
+    }
+
+    /// Impulse of the floor on it over the step (dyn·s).
+    pub(super) fn impulse(&self, law: &Law) -> [f64; 2] {
+        self.impulse.map(|part| part / law.weight)
+    }
+
+    /// The law: state and impulse at the mean velocity `v`.
+    fn law(&self, v: [f64; 2], law: &Law) -> (Touch, [f64; 2]) {
+        let pull = [0, 1].map(|k| (self.target[k] - v[k]) * law.stiffness);
+        let mu = self.friction;
+        if pull[0].abs() <= mu * pull[1] {
+            (Touch::Stick, pull)
+        } else if pull[1] + mu * pull[0].abs() <= 0.0 {
+            (Touch::Open, [0.0; 2])
+        } else {
+            let normal = (pull[1] + mu * pull[0].abs()) / (1.0 + mu * mu);
+            (if pull[0] > 0.0 { Touch::SlideForward } else { Touch::SlideBackward }, [mu * normal * pull[0].signum(), normal])
+        }
+    }
+
+    /// Direction of the impulse of a sliding corner.
+    fn slide(&self, touch: Touch) -> [f64; 2] {
+        let scale = 1.0 / (1.0 + self.friction * self.friction).sqrt();
+        [if touch == Touch::SlideForward { self.friction * scale } else { -self.friction * scale }, scale]
+    }
+
+    /// a·b through the law's piece: −dλ/dw = stiffness · (0, all, or the part along the slide).
+    fn product(&self, touch: Touch, a: [f64; 2], b: [f64; 2], law: &Law) -> f64 {
+        let dot = |u: [f64; 2], v: [f64; 2]| u[0] * v[0] + u[1] * v[1];
+        law.stiffness
+            * match touch {
+                Touch::Open => 0.0,
+                Touch::Stick => dot(a, b),
+                Touch::SlideForward | Touch::SlideBackward => {
+                    let d = self.slide(touch);
+                    dot(a, d) * dot(b, d)
+                }
+            }
+    }
+
+    /// Adds the corner's terms to its body's inertia and force.
+    #[inline(always)]
+    pub(super) fn add_to(&self, body: &mut Articulated, law: &Law) {
+        let k = law.stiffness;
+        let [ax, az] = self.arm;
+        let [tx, tz] = self.target;
+        let Articulated { inertia, force } = body;
+        match self.touch {
+            Touch::Open => {}
+            Touch::Stick => {
+                inertia[0] += k * (ax * ax + az * az);
+                inertia[1] -= k * az;
+                inertia[2] += k * ax;
+                inertia[3] += k;
+                inertia[5] += k;
+                force[0] += k * (ax * tz - az * tx);
+                force[1] += k * tx;
+                force[2] += k * tz;
+            }
+            Touch::SlideForward | Touch::SlideBackward => {
+                let [dx, dz] = self.slide(self.touch);
+                // Velocity of the corner along d is row · (ω, v).
+                let row = [dz * ax - dx * az, dx, dz];
+                let stiff = row.map(|part| k * part);
+                let wanted = dx * tx + dz * tz;
+                inertia[0] += stiff[0] * row[0];
+                inertia[1] += stiff[0] * row[1];
+                inertia[2] += stiff[0] * row[2];
+                inertia[3] += stiff[1] * row[1];
+                inertia[4] += stiff[1] * row[2];
+                inertia[5] += stiff[2] * row[2];
+                for i in 0..3 {
+                    force[i] += stiff[i] * wanted;
+                }
+            }
+        }
+    }
+
+    fn velocity_in(&self, mean: &Spatial) -> [f64; 2] {
+        [mean[1] - mean[0] * self.arm[1], mean[2] + mean[0] * self.arm[0]]
+    }
+
+    /// Whether the body's motion `mean` asks for the state that it was solved with; the impulse belongs to it then.
+    pub(super) fn agrees(&mut self, mean: &Spatial, law: &Law) -> bool {
+        let (touch, impulse) = self.law(self.velocity_in(mean), law);
+        self.impulse = impulse;
+        touch == self.touch
+    }
+
+    /// Takes the body's motion `mean` as iterate.
+    pub(super) fn accept(&mut self, mean: &Spatial, law: &Law) {
+        self.velocity = self.velocity_in(mean);
+        (self.touch, self.impulse) = self.law(self.velocity, law);
+    }
+
+    /// Prepares a search from the iterate to `mean`; returns impulse·step at the iterate as the piece extends it to the end.
+    pub(super) fn aim(&mut self, mean: &Spatial, law: &Law) -> f64 {
+        let to = self.velocity_in(mean);
+        self.step = [0, 1].map(|k| to[k] - self.velocity[k]);
+        self.product(self.touch, [0, 1].map(|k| self.target[k] - to[k]), self.step, law)
+    }
+
+    /// impulse·step and its slope at the share `t` of the search.
+    pub(super) fn search(&self, t: f64, law: &Law) -> (f64, f64) {
+        let v = [0, 1].map(|k| self.velocity[k] + t * self.step[k]);
+        let (touch, impulse) = self.law(v, law);
+        (impulse[0] * self.step[0] + impulse[1] * self.step[1], -self.product(touch, self.step, self.step, law))
+    }
+
+    /// Goes the share `t` of the search.
+    pub(super) fn go(&mut self, t: f64, law: &Law) {
+        self.velocity = [0, 1].map(|k| self.velocity[k] + t * self.step[k]);
+        (self.touch, self.impulse) = self.law(self.velocity, law);
+    }
+
+    /// The state as a number for storing.
+    pub(super) fn saved(&self) -> f64 {
+        f64::from(self.touch as u8)
+    }
+
+    pub(super) fn restore(&mut self, saved: f64) {
+        self.touch = match saved as u8 {
+            1 => Touch::Stick,
+            2 => Touch::SlideForward,
+            3 => Touch::SlideBackward,
+            _ => Touch::Open,
+        };
+    }
+}

@@ -1,0 +1,548 @@
+//! The same robot in the plane: springs and dampers implicit, contact as a convex problem, every step linear in the number of links.
+//!
+//! # Scheme
+//!
+//! Angles live at whole steps, rates half a step later (leapfrog). A step solves for the change of the generalised velocities Δ
+//!
+//! ```text
+//! (M + h·D/2 + h²·K/4) Δ = h·(τ(q, v₋) + gravity − C(q, v)) + Jᵀλ,      v₊ = v₋ + Δ,      q₊ = q + h·v₊
+//! ```
+//!
+//! with the springs taken at the mean (q₋ + 2q + q₊)/4 and the dampers at the mean of both rates: of second order between impacts, stable at
+//! any step, with no energy made. K and D are diagonal in the joints, so they only add to each joint's articulated inertia, and the
+//! articulated-body recursion solves a step in one walk down the chain and one back.
+//!
+//! The centre of mass is the floating coordinate; its momentum changes by gravity and contact alone.
+//!
+//! # Contact
+//!
+//! The two bottom corners of every box may touch the floor. In end-of-step velocities, with a look-ahead of one step
+//!
+//! ```text
+//! 0 ≤ v_n + gap/h  ⊥  λ_n ≥ 0,        |λ_t| ≤ μ λ_n
+//! ```
+//!
+//! so a corner never passes the floor: it stops on it, without bounce. Friction is the convex model of Anitescu: its minimum is unique, and
+//! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. Newton's method over the corners' states (open, sticking, sliding) puts
+//! active corners into the recursion as terms of their bodies' inertia.
+//!
+//! # References
+//!
+//! R. Featherstone, *Rigid Body Dynamics Algorithms*, chapter 7 (articulated bodies). D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth.
+//! Eng. 39 (1996) (time stepping with complementarity). M. Anitescu, Math. Program. 105 (2006) (the convex model). A. Castro et al., arXiv
+//! 2110.10107 (regularised cones and Newton's method).
+
+mod contact;
+mod recursion;
+
+use self::contact::{Corner, Law};
+use self::recursion::{Link, Spatial, solve};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
+use crate::actuator::PiezoJoint;
+use crate::analytic;
+use crate::model::{Mount, Robot};
+
+/// Bullet's limit on the product of two friction coefficients, kept for equal friction.
+const LARGEST_FRICTION: f64 = 10.0;
+/// The weight of a step's end over that of its start is 1/2 + this (1/s) times the step, so that what alternates from step to step dies out:
+/// a velocity that springs and dampers dictate keeps −(1 − w)/w of an alternation per step. For a mode of angular frequency ω this adds
+/// h (w − 1/2) ω/2 to the damping ratio, of second order in h.
+const NUMERICAL_DAMPING: f64 = 50.0;
+/// Newton steps after which a contact problem is given up.
+const LARGEST_ITERATIONS: u32 = 100;
+/// The search ends where the slope of the cost is this share of the one it began with.
+const SEARCH_ENOUGH: f64 = 0.1;
+/// Steps of the search along one Newton step; it ends much earlier.
+const LARGEST_SEARCH: u32 = 60;
+
+/// A Newton step is the last if the cost falls by less than these shares of m (g h)² and of the kinetic energy: the first is a velocity of
+/// 10⁻⁶ of what gravity gives in a step, the second what rounding leaves.
+const DONE_OF_GRAVITY: f64 = 1e-12;
+const DONE_OF_KINETIC: f64 = 1e-18;
+
+/// The robot as a planar chain.
+pub struct PlanarEngine {
+    joint: PiezoJoint,
+    motors_per_actuator: usize,
+    mount: Mount,
+    time_step: f64,
+    stable_step: f64,
+    gravity: f64,
+    mass: f64,
+    half_thickness: f64,
+    /// Of each body with the floor.
+    friction: Vec<f64>,
+    /// Left end of a clamped chain (cm).
+    left: [f64; 2],
+    root: usize,
+    lengths: Vec<f64>,
+    /// Angle of each body above the x axis, counted anticlockwise (rad): minus the sum of the joint angles.
+    angles: Vec<f64>,
+    /// Rate of each body (rad/s) and velocity of its centre of mass (cm/s).
+    motions: Vec<Spatial>,
+    /// Centre of mass (cm) and its velocity (cm/s).
+    centre: [f64; 2],
+    velocity: [f64; 2],
+    links: Vec<Link>,
+    corners: Vec<Corner>,
+    /// Mean motions of the left ends in the iterate of the contact problem.
+    iterate: Vec<Spatial>,
+    law: Law,
+    weight: f64,
+    step: u64,
+    state: JointState,
+    /// Newton iterations so far, of all steps.
+    iterations: u64,
+    /// Energy that the weight of the step's end has taken so far (erg).
+    numerical_loss: f64,
+}
+
+impl PlanarEngine {
+    /// Builds `robot`, at rest and flat, to be stepped by `time_step` (s).
+    ///
+    /// # Errors
+    /// [`EngineError::Model`] for a robot that cannot be built.
+    pub fn new(robot: &Robot, time_step: f64) -> Result<Self, EngineError> {
+        robot.check()?;
+        let segments = robot.segments();
+        let count = segments.len();
+        let joint = robot.joint();
+        let thickness = robot.collision_thickness;
+        let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
+        let weight = (0.5 + NUMERICAL_DAMPING * time_step).min(1.0);
+        let implicit = weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step);
+        let root = if robot.mount == Mount::Clamped { 0 } else { count / 2 };
+        let links = segments
+            .iter()
+            .enumerate()
+            .map(|(i, s)| {
+                let side = if i < root { -1.0 } else { 1.0 };
+                Link::new(s.length, side, s.mass, s.mass / 12.0 * (s.length.powi(2) + thickness.powi(2)), implicit)
+            })
+            .collect();
+        // The base's centre stands at the origin, as in Bullet.
+        let left = -0.5 * segments[0].length;
+        let (mut at, mut moment) = (left, 0.0);
+        for segment in &segments {
+            moment += segment.mass * (at + 0.5 * segment.length);
+            at += segment.length;
+        }
+        let joints = || vec![0.0; count - 1];
+        Ok(Self {
+            joint,
+            motors_per_actuator: robot.motors_per_actuator,
+            mount: robot.mount,
+            time_step,
+            stable_step: analytic::stable_step(robot),
+            gravity: robot.material.gravity,
+            mass,
+            half_thickness: 0.5 * thickness,
+            friction: segments.iter().map(|s| (s.friction * robot.friction.ground).min(LARGEST_FRICTION)).collect(),
+            left: [left, 0.0],
+            root,
+            lengths: segments.iter().map(|s| s.length).collect(),
+            angles: vec![0.0; count],
+            motions: vec![[0.0; 3]; count],
+            centre: [moment / mass, 0.0],
+            velocity: [0.0; 2],
+            links,
+            corners: vec![Corner::default(); if robot.mount == Mount::Ground { 2 * count } else { 0 }],
+            iterate: vec![[0.0; 3]; count],
+            law: Law::new(time_step, weight, mass),
+            weight,
+            step: 0,
+            state: JointState { angles: joints(), rates: joints(), torques: joints(), motor_voltages: joints() },
+            iterations: 0,
+            numerical_loss: 0.0,
+        })
+    }
+
+    /// Contact problems' Newton iterations over all steps so far; 0 for steps without contact.
+    pub fn iterations(&self) -> u64 {
+        self.iterations
+    }
+
+    fn clamped(&self) -> bool {
+        self.mount == Mount::Clamped
+    }
+
+    /// Turns the links to where they are `ahead` (s) of the state if all goes on at its rates.
+    fn turn(&mut self, ahead: f64) {
+        for ((link, angle), motion) in self.links.iter_mut().zip(&self.angles).zip(&self.motions) {
+            let (sin, cos) = (angle + ahead * motion[0]).sin_cos();
+            link.along = [cos, sin];
+        }
+    }
+
+    /// Left end of the chain (cm) as the links are turned, `ahead` (s) of the state.
+    fn left_end(&self, ahead: f64) -> [f64; 2] {
+        if self.clamped() {
+            return self.left;
+        }
+        let (mut at, mut moment) = ([0.0; 2], [0.0; 2]);
+        for (link, length) in self.links.iter().zip(&self.lengths) {
+            for k in 0..2 {
+                let along = length * link.along[k];
+                moment[k] += link.mass * (at[k] + 0.5 * along);
+                at[k] += along;
+            }
+        }
+        [0, 1].map(|k| self.centre[k] + ahead * self.velocity[k] - moment[k] / self.mass)
+    }
+
+    /// Velocity of the left end (cm/s) as the links are turned, from the rates and the velocity of the centre of mass.
+    fn left_velocity(&self) -> [f64; 2] {
+        if self.clamped() {
+            return [0.0; 2];
+        }
+        let (mut at, mut momentum) = ([0.0; 2], [0.0; 2]);
+        for ((link, length), motion) in self.links.iter().zip(&self.lengths).zip(&self.motions) {
+            let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
+            for k in 0..2 {
+                momentum[k] += link.mass * (at[k] + 0.5 * across[k]);
+                at[k] += across[k];
+            }
+        }
+        [0, 1].map(|k| self.velocity[k] - momentum[k] / self.mass)
+    }
+
+    /// Looks which corners may touch during this step; whether any does.
+    fn find_corners(&mut self) -> bool {
+        let half = self.half_thickness;
+        let mut any = false;
+        let mut height = self.left_end(0.5 * self.time_step)[1] + half;
+        for (i, (pair, link)) in self.corners.chunks_exact_mut(2).zip(&self.links).enumerate() {
+            // The side of the box that looks down, and where its ends are from the reference point.
+            let down = half.copysign(link.along[0]);
+            let (side, drop) = (down * link.along[1], -down * link.along[0]);
+            let from = if link.reach < 0.0 { link.reach } else { 0.0 };
+            for (k, corner) in pair.iter_mut().enumerate() {
+                let reach = from + if k == 0 { 0.0 } else { self.lengths[i] };
+                let gap = height + (reach - from) * link.along[1] + drop;
+                let arm = [reach * link.along[0] + side, reach * link.along[1] + drop];
+                any |= corner.place(arm, gap, self.friction[i], &self.law);
+            }
+            height += self.lengths[i] * link.along[1];
+        }
+        if !any {
+            return false;
+        }
+        let mut velocity = self.left_velocity();
+        for (((pair, link), motion), length) in
+            self.corners.chunks_exact_mut(2).zip(&self.links).zip(&self.motions).zip(&self.lengths)
+        {
+            let rate = motion[0];
+            let end = [velocity[0] - rate * length * link.along[1], velocity[1] + rate * length * link.along[0]];
+            let reference = if link.reach < 0.0 { end } else { velocity };
+            for corner in pair.iter_mut().filter(|corner| corner.near) {
+                corner.begin([reference[0] - rate * corner.arm[1], reference[1] + rate * corner.arm[0]], &self.law);
+            }
+            velocity = end;
+        }
+        true
+    }
+
+    /// Solves the step's mean motion into the links, with Newton's method over the corners' states.
+    ///
+    /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
+    /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is minimised along the way there.
+    fn solve_contact(&mut self) -> Result<(), EngineError> {
+        for iteration in 1..=LARGEST_ITERATIONS {
+            self.iterations += 1;
+            solve(&mut self.links, self.root, false, &self.corners, &self.law);
+            let mut agrees = true;
+            for (corners, link) in self.corners.chunks_exact_mut(2).zip(&self.links) {
+                for corner in corners.iter_mut().filter(|corner| corner.near) {
+                    agrees &= corner.agrees(&link.mean, &self.law);
+                }
+            }
+            if agrees {
+                return Ok(());
+            }
+            let search = if iteration == 1 { Search::Whole } else { self.search() };
+            if search == Search::Done {
+                return Ok(());
+            }
+            if search == Search::Whole {
+                // The states that it was solved for were a guess: any motion will do for an iterate.
+                for (i, link) in self.links.iter().enumerate() {
+                    self.iterate[i] = link.mean;
+                    for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
+                        corner.accept(&link.mean, &self.law);
+                    }
+                }
+            }
+        }
+        let time = self.step as f64 * self.time_step;
+        Err(EngineError::NotConverged { iterations: LARGEST_ITERATIONS, step: self.step, time })
+    }
+
+    /// Minimises the cost between the iterate and the links' mean motion, and moves the iterate there.
+    ///
+    /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
+    fn search(&mut self) -> Search {
+        let (mut metric, mut end) = (0.0, 0.0);
+        let mut kinetic = 0.0;
+        let mut turn_before = 0.0;
+        for (i, link) in self.links.iter().enumerate() {
+            let from = self.iterate[i];
+            let d = [0, 1, 2].map(|k| link.mean[k] - from[k]);
+            let half = 0.5 * link.reach * d[0];
+            let (x, z) = (d[1] - half * link.along[1], d[2] + half * link.along[0]);
+            metric += link.mass * (x * x + z * z) + link.inertia * d[0] * d[0];
+            let [turn, x, z] = link.mean_of_centre();
+            kinetic += link.mass * (x * x + z * z) + link.inertia * turn * turn;
+            if i > 0 {
+                // All joints are alike.
+                metric += link.implicit * (d[0] - turn_before).powi(2);
+            }
+            turn_before = d[0];
+            for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
+                end += corner.aim(&link.mean, &self.law);
+            }
+        }
+        let slope_at = |t: f64| {
+            let (mut first, mut second) = (end - (1.0 - t) * metric, metric);
+            for corner in self.corners.iter().filter(|corner| corner.near) {
+                let (along, slope) = corner.search(t, &self.law);
+                first -= along;
+                second -= slope;
+            }
+            (first, second)
+        };
+        let weight = self.gravity * self.time_step;
+        let start = -slope_at(0.0).0;
+        if start <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic {
+            return Search::Done;
+        }
+        let enough = SEARCH_ENOUGH * start;
+        let (mut low, mut high, mut t) = (0.0, 1.0, 1.0);
+        let mut found = 1.0;
+        for _ in 0..LARGEST_SEARCH {
+            let (first, second) = slope_at(t);
+            found = t;
+            if first > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            if first.abs() <= enough || (t == 1.0 && first < 0.0) {
+                break;
+            }
+            let next = t - first / second;
+            t = if next > low && next < high { next } else { 0.5 * (low + high) };
+            if t == found || high - low <= f64::EPSILON * high {
+                break;
+            }
+        }
+        if found == 1.0 {
+            return Search::Whole;
+        }
+        for (i, link) in self.links.iter().enumerate() {
+            for k in 0..3 {
+                self.iterate[i][k] += found * (link.mean[k] - self.iterate[i][k]);
+            }
+            for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
+                corner.go(found, &self.law);
+            }
+        }
+        Search::Part
+    }
+}
+
+/// How a search along a Newton step ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Search {
+    /// The cost cannot fall any more.
+    Done,
+    /// The lowest cost is at the end of the step.
+    Whole,
+    /// It is on the way.
+    Part,
+}
+
+impl Engine for PlanarEngine {
+    fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        let m = self.motors_per_actuator as f64;
+        let mut sum = 0.0;
+        for i in 0..self.state.angles.len() {
+            // Joint angles count the other way round.
+            let angle = self.angles[i] - self.angles[i + 1];
+            let rate = self.motions[i][0] - self.motions[i + 1][0];
+            let volts = voltages[i / self.motors_per_actuator] / m;
+            self.state.angles[i] = angle;
+            self.state.rates[i] = rate;
+            self.state.motor_voltages[i] = volts;
+            self.state.torques[i] = self.joint.torque(angle, rate, volts);
+            sum += 0.0 * angle + 0.0 * rate;
+        }
+        sum += 0.0 * (self.centre[0] + self.centre[1] + self.velocity[0] + self.velocity[1]);
+        if sum == 0.0 {
+            return Ok(());
+        }
+        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !(a + r).is_finite());
+        let what =
+            bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
+        let time = self.step as f64 * self.time_step;
+        Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: self.stable_step })
+    }
+
+    fn joints(&self) -> &JointState {
+        &self.state
+    }
+
+    /// Positions and velocities of the same time, unlike the reference's.
+    fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
+        self.turn(0.0);
+        let mut velocity = self.left_velocity();
+        let mut position = self.left_end(0.0);
+        let ends = self.links.iter().zip(&self.motions).zip(&self.lengths).map(|((link, motion), length)| {
+            let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
+            (link.along.map(|a| a * length), across)
+        });
+        let rows = positions.chunks_exact_mut(3).zip(velocities.chunks_exact_mut(3));
+        for ((node, node_velocity), (along, across)) in rows.zip(ends.chain([([0.0; 2], [0.0; 2])])) {
+            node.copy_from_slice(&[position[0], 0.0, position[1]]);
+            node_velocity.copy_from_slice(&[velocity[0], 0.0, velocity[1]]);
+            for k in 0..2 {
+                position[k] += along[k];
+                velocity[k] += across[k];
+            }
+        }
+        Ok(())
+    }
+
+    fn base(&mut self) -> Result<PlanarBase, EngineError> {
+        self.turn(0.0);
+        let rate = self.motions[0][0];
+        let half = self.links[0].along.map(|along| 0.5 * self.lengths[0] * along);
+        let (position, velocity) = (self.left_end(0.0), self.left_velocity());
+        Ok(PlanarBase {
+            position: [0, 1].map(|k| position[k] + half[k]),
+            pitch: -self.angles[0],
+            velocity: [velocity[0] - rate * half[1], velocity[1] + rate * half[0]],
+            pitch_rate: -rate,
+        })
+    }
+
+    fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
+        contacts.clear();
+        self.turn(0.0);
+        let mut left = self.left_end(0.0);
+        for (i, (pair, link)) in self.corners.chunks_exact(2).zip(&self.links).enumerate() {
+            let right = [0, 1].map(|k| left[k] + self.lengths[i] * link.along[k]);
+            for corner in pair {
+                let impulse = corner.impulse(&self.law);
+                if impulse[1] > 0.0 {
+                    let reference = if link.reach < 0.0 { right } else { left };
+                    let position = [0, 1].map(|k| reference[k] + corner.arm[k]);
+                    contacts.push(Contact { link: i, position, force: impulse.map(|part| part / self.time_step) });
+                }
+            }
+            left = right;
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self) -> Result<(), EngineError> {
+        let h = self.time_step;
+        let share = self.weight * h;
+        self.turn(0.5 * h);
+        let joints = self.state.angles.iter().zip(&self.state.motor_voltages);
+        for (i, (angle, volts)) in joints.enumerate() {
+            // Spring and drive at the start; the implicit part adds what the mean rate makes.
+            let torque = share * self.joint.torque(*angle, 0.0, *volts);
+            if i < self.root {
+                self.links[i].torque = torque;
+            } else {
+                self.links[i + 1].torque = -torque;
+            }
+        }
+        let fall = share * self.gravity;
+        for (link, [rate, x, z]) in self.links.iter_mut().zip(&self.motions) {
+            link.momentum = [link.inertia * rate, link.mass * x, link.mass * (z - fall)];
+        }
+        if self.find_corners() {
+            self.solve_contact()?;
+        } else {
+            solve(&mut self.links, self.root, self.mount == Mount::Clamped, &[], &self.law);
+        }
+        let per_weight = 1.0 / self.weight;
+        let (mut momentum, mut change_squared) = ([0.0; 2], 0.0);
+        for ((link, motion), angle) in self.links.iter().zip(&mut self.motions).zip(&mut self.angles) {
+            let mean = link.mean_of_centre();
+            *angle += h * mean[0];
+            let change = [0, 1, 2].map(|k| (mean[k] - motion[k]) * per_weight);
+            for k in 0..3 {
+                motion[k] += change[k];
+            }
+            change_squared += link.inertia * change[0] * change[0] + link.mass * (change[1] * change[1] + change[2] * change[2]);
+            momentum[0] += link.mass * motion[1];
+            momentum[1] += link.mass * motion[2];
+        }
+        self.numerical_loss += (self.weight - 0.5) * change_squared;
+        if !self.clamped() {
+            for k in 0..2 {
+                let after = momentum[k] / self.mass;
+                self.centre[k] += h * (self.velocity[k] + self.weight * (after - self.velocity[k]));
+                self.velocity[k] = after;
+            }
+        }
+        self.step += 1;
+        Ok(())
+    }
+
+    fn midpoint(&self) -> bool {
+        true
+    }
+
+    fn kinetic_energy(&self) -> Option<f64> {
+        Some(
+            self.links
+                .iter()
+                .zip(&self.motions)
+                .map(|(link, [rate, x, z])| 0.5 * (link.mass * (x * x + z * z) + link.inertia * rate * rate))
+                .sum(),
+        )
+    }
+
+    fn numerical_loss(&self) -> f64 {
+        self.numerical_loss
+    }
+
+    fn save(&self) -> Result<Vec<f64>, EngineError> {
+        let mut state = self.angles.clone();
+        state.extend(self.motions.iter().flatten());
+        state.extend(self.centre);
+        state.extend(self.velocity);
+        state.extend(self.corners.iter().map(Corner::saved));
+        Ok(state)
+    }
+
+    fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
+        let count = self.angles.len();
+        if state.len() != 4 * count + 4 + self.corners.len() || state.iter().any(|value| !value.is_finite()) {
+            return Err(EngineError::State);
+        }
+        let (angles, rest) = state.split_at(count);
+        let (motions, rest) = rest.split_at(3 * count);
+        self.angles.copy_from_slice(angles);
+        for (motion, saved) in self.motions.iter_mut().zip(motions.chunks_exact(3)) {
+            motion.copy_from_slice(saved);
+        }
+        (self.centre, self.velocity) = ([rest[0], rest[1]], [rest[2], rest[3]]);
+        for (corner, saved) in self.corners.iter_mut().zip(&rest[4..]) {
+            corner.restore(*saved);
+        }
+        self.step = step;
+        Ok(())
+    }
+
+    fn step(&self) -> u64 {
+        self.step
+    }
+
+    fn clamp_hits(&self) -> Option<ClampHits> {
+        None
+    }
+}
