@@ -89,6 +89,8 @@ fn json_is_one_object_with_a_schema_and_quiet_is_quiet() {
         schema: u32,
         measures: std::collections::BTreeMap<String, f64>,
         energy: std::collections::BTreeMap<String, Option<f64>>,
+        time_step_s: f64,
+        step_choice: Option<String>,
         steps: u64,
         records: usize,
         simulated_s: f64,

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::{Failure, Options, print};
-use crate::crosscheck::{self, BUILTIN, Quantity, Report, compare};
+use crate::crosscheck::{self, BUILTIN, EngineReport, PARTED, Quantity, Report, compare};
 use crate::experiment::{self, Control, Experiment, Source};
 use crate::recording::{Recording, npz};
 
@@ -16,6 +16,8 @@ use crate::recording::{Recording, npz};
 /// Joint angles, rates and torques must have equal bits, node positions agree within 1e-5 cm. Without experiments a built-in set
 /// of fourteen is used; without --against, --pybullet or --sfers it is compared with recordings of the authors' code on PyBullet
 /// 3.2.7 that this program carries. Exit code 0 if all agree, 1 if not.
+///
+/// With --engines the planar engine is compared with Bullet instead, by their measures; without experiments on a built-in set of ten.
 ///
 /// Example: sfers crosscheck jump.toml --pybullet .venv/bin/python
 #[derive(Debug, clap::Args)]
@@ -34,6 +36,12 @@ pub struct Args {
     /// A checkout of the authors' package: runs their classes, with the Python of --pybullet or else python3.
     #[arg(long, value_name = "DIR")]
     sfers: Option<PathBuf>,
+    /// Compare this program's two engines, Bullet at the experiment's time step and the planar one at --planar-step.
+    #[arg(long, conflicts_with_all = ["against", "pybullet", "sfers"])]
+    engines: bool,
+    /// Time step of the planar engine (s).
+    #[arg(long, value_name = "SECONDS", default_value_t = 2e-6, requires = "engines")]
+    planar_step: f64,
 }
 
 /// One experiment to compare.
@@ -51,6 +59,9 @@ struct Outcome {
 }
 
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+    if args.engines {
+        return engines(args, options);
+    }
     let items = items(args)?;
     let outcomes = items.into_par_iter().map(|item| check(item, args)).collect::<Result<Vec<_>, _>>()?;
     let passes = outcomes.iter().all(|outcome| outcome.report.passes);
@@ -66,6 +77,60 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         print(&text)?;
     }
     Ok(if passes { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn engines(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+    if !(args.planar_step.is_finite() && args.planar_step > 0.0) {
+        return Err(Failure::Usage(format!("--planar-step {}: a number of seconds above 0 is needed", args.planar_step)));
+    }
+    let mut sources = Vec::new();
+    for path in &args.experiments {
+        sources.push(super::run::source(path, &args.settings)?);
+    }
+    if sources.is_empty() {
+        let preset = |name: &&str| experiment::presets::find(name).map(|preset| Source::from_text(preset.name, preset.text));
+        sources.extend(crosscheck::ENGINE_SET.iter().filter_map(preset));
+    }
+    let mut reports = Vec::new();
+    for source in sources {
+        let mut source = source;
+        source.set("simulation.engine=bullet")?;
+        let experiment = experiment::experiment(&source)?;
+        reports.push((source.name, crosscheck::compare_engines(&experiment, [experiment.time_step, args.planar_step])?));
+    }
+    let passes = reports.iter().all(|(_, report)| report.passes);
+    if options.json {
+        let list: Vec<_> = reports.iter().map(|(name, report)| json!({"experiment": name, "report": report})).collect();
+        print(&format!("{}\n", json!({"schema": 1, "passes": passes, "comparisons": list})))?;
+    } else {
+        print(&reports.iter().map(|(name, report)| describe_engines(name, report)).collect::<String>())?;
+    }
+    Ok(if passes { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn describe_engines(name: &str, report: &EngineReport) -> String {
+    let verdict = if report.passes { "agree" } else { "DIFFER" };
+    let parting = report.parting.map_or_else(
+        || format!("never further apart than {:.4} mm", report.largest_mm),
+        |p| format!("{:.1} mm apart first at t = {:.4} s, node {}; at most {:.2} mm", 10.0 * PARTED, p.time_s, p.node, report.largest_mm),
+    );
+    let [bullet, planar] = report.time_steps_s;
+    let mut text = format!(
+        "{name}: {verdict}; Bullet at {bullet:.1e} s, planar at {planar:.1e} s, {:.0} times faster; {parting}\n",
+        report.wall_s[0] / report.wall_s[1]
+    );
+    for pair in &report.measures {
+        let mark = if pair.passes { "" } else { "  <-- TOO FAR" };
+        text += &format!(
+            "  {:20} {:>12.5} {:>12.5}  {:+.2e}  allowed {:.1e}{mark}\n",
+            pair.name,
+            pair.bullet,
+            pair.planar,
+            pair.planar - pair.bullet,
+            pair.allowed
+        );
+    }
+    text
 }
 
 fn items(args: &Args) -> Result<Vec<Item>, Failure> {

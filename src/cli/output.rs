@@ -96,6 +96,7 @@ pub fn manifest(experiment: &crate::experiment::Experiment, wall_s: f64, interru
         "command": std::env::args().collect::<Vec<_>>(),
         "experiment": experiment.config,
         "resolved_cgs": experiment.spec(),
+        "step_choice": experiment.step_choice,
         "git_revision": env!("SFERS_GIT_REVISION"),
         "version": env!("CARGO_PKG_VERSION"),
         "bullet": format!("{} {}", env!("SFERS_BULLET_VERSION"), env!("SFERS_BULLET_PRECISION")),

@@ -12,7 +12,7 @@ use super::output::{Output, date_time, finish, manifest, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print};
 use crate::analytic;
 use crate::engine::Engine;
-use crate::experiment::{self, Control, Experiment, Run, SavedState, Source};
+use crate::experiment::{self, Control, EngineKind, Experiment, Run, SavedState, Source};
 use crate::export;
 use crate::recording::measures::Measures;
 
@@ -26,6 +26,9 @@ pub struct Args {
     /// Override a key, for example robot.damping_eta=0.03. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+    /// What steps the robot: bullet (bit for bit the reference) or planar (the fast one). Short for --set simulation.engine=NAME.
+    #[arg(long, value_name = "NAME")]
+    engine: Option<String>,
     /// Take the bodies from a URDF: a chain of boxes with hinges about +y. `-` is standard input.
     #[arg(long, value_name = "FILE.urdf")]
     robot: Option<PathBuf>,
@@ -63,7 +66,11 @@ pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
 }
 
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
-    let mut experiment = experiment::experiment(&source(&args.experiment, &args.settings)?)?;
+    let mut source = source(&args.experiment, &args.settings)?;
+    if let Some(engine) = &args.engine {
+        source.set(&format!("simulation.engine={engine}"))?;
+    }
+    let mut experiment = experiment::experiment(&source)?;
     if let Some(path) = &args.robot {
         if path == Path::new("-") && args.experiment == path.as_path() {
             return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
@@ -81,7 +88,13 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
 
     let mut warnings = Vec::new();
     let stable = analytic::stable_step(&experiment.robot);
-    if experiment.time_step > stable {
+    if let Some(choice) = &experiment.step_choice {
+        options.remark(&format!(
+            "time step {:.3e} s: from twice that, the {} of the first {} s changes by {:.1e} (allowed {:.0e})",
+            choice.time_step_s, choice.measure, choice.stretch_s, choice.change, choice.asked
+        ));
+    }
+    if experiment.engine == EngineKind::Bullet && experiment.time_step > stable {
         warnings.push(format!("the time step {:e} s is above the largest stable one, {stable:.2e} s", experiment.time_step));
         options.remark(&format!("warning: {}", warnings[0]));
     }
@@ -138,6 +151,8 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
             "schema": 1,
             "measures": measures,
             "energy": energy,
+            "time_step_s": experiment.time_step,
+            "step_choice": experiment.step_choice,
             "steps": steps,
             "records": recording.len(),
             "simulated_s": steps as f64 * experiment.time_step,

@@ -99,6 +99,41 @@ impl Drive {
         }
     }
 
+    /// Whether voltages change by jumps only.
+    fn jumps(&self) -> bool {
+        !matches!(self.waveform, Waveform::Sine { .. } | Waveform::Table(_))
+    }
+
+    /// Mean voltages (V) from `from` to `to` (s) into `out`, with `scratch` of the same length: a jump within counts from its moment on,
+    /// what changes smoothly is taken at the middle.
+    pub fn mean(&self, from: f64, to: f64, out: &mut [f64], scratch: &mut [f64]) {
+        if !self.jumps() {
+            return self.voltages(0.5 * (from + to), out);
+        }
+        self.voltages(from, out);
+        self.voltages(to, scratch);
+        if out == scratch {
+            return;
+        }
+        // The jump lies between `before` and `after`.
+        let (mut before, mut after) = (from, to);
+        let first = out[..].iter().zip(&*scratch).position(|(a, b)| a != b).unwrap_or(0);
+        let value = out[first];
+        loop {
+            let middle = 0.5 * (before + after);
+            if middle <= before || middle >= after {
+                break;
+            }
+            self.voltages(middle, scratch);
+            if scratch[first] == value { before = middle } else { after = middle }
+        }
+        self.voltages(to, scratch);
+        let share = (after - from) / (to - from);
+        for (out, end) in out.iter_mut().zip(&*scratch) {
+            *out = share * *out + (1.0 - share) * end;
+        }
+    }
+
     /// The period of the waveform (s), if it repeats.
     pub fn period(&self) -> Option<f64> {
         match &self.waveform {

@@ -37,6 +37,20 @@ pub enum EngineError {
         /// The time of the step (s).
         time: f64,
     },
+    /// A time step that the robot's slowest motion cannot be seen with.
+    #[error("the time step {time_step} s is too long for this robot: at most {longest:.2e} s, a tenth of the period of one actuator's first mode")]
+    StepTooLong {
+        /// The step (s).
+        time_step: f64,
+        /// The longest (s).
+        longest: f64,
+    },
+    /// A robot that comes to rest nowhere.
+    #[error("there is no equilibrium to start from: {reason}")]
+    NoEquilibrium {
+        /// Why.
+        reason: String,
+    },
     /// A saved state that is not one of this robot.
     #[error("the state does not fit this robot")]
     State,

@@ -159,11 +159,23 @@ pub struct PhaseConfig {
 #[allow(missing_docs)]
 pub struct SimulationConfig {
     pub engine: Option<String>,
-    pub time_step_s: Option<f64>,
+    pub start: Option<String>,
+    pub time_step_s: Option<StepConfig>,
+    pub step_error: Option<f64>,
+    pub step_measure: Option<String>,
     pub steps: Option<u64>,
     pub duration_s: Option<f64>,
     pub record_every_steps: Option<u64>,
     pub record_every_s: Option<f64>,
+}
+
+/// A time step: seconds, or the word `auto`.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "time_step_s is a number of seconds or \"auto\"")]
+#[allow(missing_docs)]
+pub enum StepConfig {
+    Seconds(f64),
+    Word(String),
 }
 
 /// The text of an experiment with the settings that override it: where every value came from.

@@ -1,5 +1,6 @@
 //! An experiment: a robot, what drives it, and how long it is simulated.
 
+mod auto;
 mod config;
 mod drive_csv;
 pub mod presets;
@@ -8,10 +9,12 @@ mod run;
 mod spec;
 mod state;
 
+pub use auto::StepChoice;
 pub use config::{
     Config, ConfigError, DriveConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
+    StepConfig,
 };
-pub use resolve::experiment;
+pub use resolve::{check, experiment};
 pub use run::{Control, Run, run};
 pub use state::SavedState;
 
@@ -46,6 +49,10 @@ pub struct Experiment {
     pub record_every: u64,
     /// What steps the robot.
     pub engine: EngineKind,
+    /// Where the robot starts from.
+    pub start: Start,
+    /// How the time step was chosen, if the program chose it.
+    pub step_choice: Option<StepChoice>,
     /// The keys as they were given.
     pub config: Config,
 }
@@ -59,6 +66,15 @@ pub enum EngineKind {
     Planar,
 }
 
+/// The pose at the beginning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// Flat and at rest, as in the reference.
+    Flat,
+    /// At rest in equilibrium with gravity, the floor and the first voltages.
+    Settled,
+}
+
 impl Experiment {
     /// Builds the engine that the experiment asks for.
     ///
@@ -67,7 +83,15 @@ impl Experiment {
     pub fn engine(&self) -> Result<Box<dyn Engine>, EngineError> {
         Ok(match self.engine {
             EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
-            EngineKind::Planar => Box::new(PlanarEngine::new(&self.robot, self.time_step)?),
+            EngineKind::Planar => {
+                let mut engine = PlanarEngine::new(&self.robot, self.time_step)?;
+                if self.start == Start::Settled {
+                    let mut voltages = vec![0.0; self.robot.actuators];
+                    self.drive.voltages(0.0, &mut voltages);
+                    engine.settle(&voltages)?;
+                }
+                Box::new(engine)
+            }
         })
     }
 

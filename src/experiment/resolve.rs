@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::config::{Config, ConfigError, DriveConfig, Fault, PhaseConfig, Source};
-use super::{EngineKind, Experiment, drive_csv};
+use super::config::{Config, ConfigError, DriveConfig, Fault, PhaseConfig, Source, StepConfig};
+use super::{EngineKind, Experiment, Start, auto, drive_csv};
 use crate::drive::gait::{self, Parameter};
 use crate::drive::{Drive, Waveform};
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
@@ -16,7 +16,7 @@ const MAX_RECORDED_VALUES: f64 = 4e8;
 const DEFAULT_ON_VOLTAGES: [f64; 5] = [520.0, 520.0, -1500.0, 520.0, 520.0];
 
 /// What may go wrong on the way: a value, or a file that a value names.
-enum Trouble {
+pub(super) enum Trouble {
     Fault(Fault),
     Config(ConfigError),
 }
@@ -32,24 +32,58 @@ impl From<Fault> for Trouble {
 /// # Errors
 /// [`ConfigError`] with file, line and key.
 pub fn experiment(source: &Source) -> Result<Experiment, ConfigError> {
+    read(source, true)
+}
+
+/// Reads an experiment without the trial runs that `time_step_s = "auto"` asks for: to see whether it makes sense.
+///
+/// # Errors
+/// As [`experiment()`].
+pub fn check(source: &Source) -> Result<Experiment, ConfigError> {
+    read(source, false)
+}
+
+fn read(source: &Source, trials: bool) -> Result<Experiment, ConfigError> {
     let config = source.parse()?;
-    resolve(&config, &source.folder).map_err(|trouble| match trouble {
+    resolve(&config, &source.folder, trials).map_err(|trouble| match trouble {
         Trouble::Fault(fault) => source.locate(fault),
         Trouble::Config(error) => error,
     })
 }
 
-fn resolve(config: &Config, folder: &Path) -> Result<Experiment, Trouble> {
+fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, Trouble> {
     let robot = robot(config)?;
     robot.check().map_err(|ModelError::Value { key, value, needed }| {
         Fault::new(key, format!("is {value} in the program's CGS units, but must be {needed}"))
     })?;
-    let (time_step, steps, record_every) = simulation(config, &robot)?;
-    let waveform = waveform(&config.drive, &robot, time_step, folder)?;
-    let drive = Drive { waveform, positive_gain: robot.positive_gain };
     let engines = [("bullet", EngineKind::Bullet), ("planar", EngineKind::Planar)];
     let engine = choose("simulation.engine", config.simulation.engine.as_deref(), EngineKind::Bullet, &engines)?;
-    Ok(Experiment { robot, drive, time_step, steps, record_every, engine, config: config.clone() })
+    let starts = [("flat", Start::Flat), ("settled", Start::Settled)];
+    let start = choose("simulation.start", config.simulation.start.as_deref(), Start::Flat, &starts)?;
+    if start == Start::Settled && engine == EngineKind::Bullet {
+        return Err(Fault::new("simulation.start", "settled needs engine = \"planar\"; the reference starts flat").into());
+    }
+    let s = &config.simulation;
+    if let Some(StepConfig::Word(word)) = &s.time_step_s {
+        if word != "auto" {
+            return Err(Fault::new("simulation.time_step_s", format!("{word:?} is neither a number of seconds nor \"auto\"")).into());
+        }
+        if engine == EngineKind::Bullet {
+            return Err(Fault::new("simulation.time_step_s", "auto needs engine = \"planar\"").into());
+        }
+        return auto::choose(config, &robot, trials, |config| resolve(config, folder, trials));
+    }
+    for (key, given) in [("step_error", s.step_error.is_some()), ("step_measure", s.step_measure.is_some())] {
+        if given {
+            return Err(Fault::new(format!("simulation.{key}"), "belongs to time_step_s = \"auto\"").into());
+        }
+    }
+    let (time_step, steps, record_every) = simulation(config, &robot)?;
+    // The reference is at 0 V in its first two steps.
+    let first = if engine == EngineKind::Bullet { 2.0 * time_step } else { 0.0 };
+    let waveform = waveform(&config.drive, &robot, first, folder)?;
+    let drive = Drive { waveform, positive_gain: robot.positive_gain };
+    Ok(Experiment { robot, drive, time_step, steps, record_every, engine, start, step_choice: None, config: config.clone() })
 }
 
 fn choose<T: Copy>(key: &str, value: Option<&str>, default: T, choices: &[(&str, T)]) -> Result<T, Fault> {
@@ -133,7 +167,9 @@ fn simulation(config: &Config, robot: &Robot) -> Result<(f64, u64, u64), Fault> 
             Err(Fault::new(key, format!("is {value}, but must be positive")))
         }
     };
-    let time_step = s.time_step_s.ok_or_else(|| Fault::new("simulation.time_step_s", "is missing"))?;
+    let Some(StepConfig::Seconds(time_step)) = s.time_step_s else {
+        return Err(Fault::new("simulation.time_step_s", "is missing"));
+    };
     positive("simulation.time_step_s", time_step)?;
     if time_step < 1e-12 {
         return Err(Fault::new("simulation.time_step_s", format!("is {time_step} s; the least is 1e-12 s")));
@@ -238,7 +274,7 @@ fn period(d: &DriveConfig) -> Result<Option<f64>, Fault> {
     }
 }
 
-fn waveform(d: &DriveConfig, robot: &Robot, time_step: f64, folder: &Path) -> Result<Waveform, Trouble> {
+fn waveform(d: &DriveConfig, robot: &Robot, first: f64, folder: &Path) -> Result<Waveform, Trouble> {
     let name = needed("drive.waveform", d.waveform.as_ref())?;
     let own = format!("waveform {name}");
     Ok(match name.as_str() {
@@ -265,7 +301,7 @@ fn waveform(d: &DriveConfig, robot: &Robot, time_step: f64, folder: &Path) -> Re
             let at = finite("drive.at_s", d.at_s.unwrap_or(0.0))?;
             let values = needed("drive.voltages_v", d.voltages_v.as_ref())?;
             // The reference holds 0 V for the first two steps.
-            Waveform::Step { voltages: voltages("drive.voltages_v", values, robot)?, at: at.max(2.0 * time_step) }
+            Waveform::Step { voltages: voltages("drive.voltages_v", values, robot)?, at: at.max(first) }
         }
         "sequence" => sequence(d, robot)?,
         "csv" => {

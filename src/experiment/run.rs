@@ -59,7 +59,7 @@ impl Run {
 ///
 /// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time
 /// is step · dt; joints are read and torques computed; the state before the step is recorded if its turn has come; the torques are
-/// applied and the world steps. Nothing is allocated inside the loop: the recording has its final size from the start.
+/// applied and the world steps. An engine that works at the middle of a step gets the step's mean voltages instead. Nothing is allocated inside the loop: the recording has its final size from the start.
 ///
 /// # Errors
 /// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
@@ -71,6 +71,7 @@ pub fn run(
     let mut recorder = Recorder::new(experiment);
     let mut books = Books::new(&experiment.robot, experiment.time_step);
     let mut voltages = vec![0.0; experiment.robot.actuators];
+    let mut scratch = voltages.clone();
     let midpoint = engine.midpoint();
     let mut interrupted = false;
     let mut done = engine.step();
@@ -82,8 +83,12 @@ pub fn run(
         }
         let before = time;
         time = done as f64 * experiment.time_step;
-        let half = 0.5 * experiment.time_step;
-        experiment.drive.voltages(if midpoint { time + half } else { before }, &mut voltages);
+        if midpoint {
+            let end = (done + 1) as f64 * experiment.time_step;
+            experiment.drive.mean(time, end, &mut voltages, &mut scratch);
+        } else {
+            experiment.drive.voltages(before, &mut voltages);
+        }
         engine.prepare(&voltages)?;
         books.take(engine)?;
         if experiment.records(done) {

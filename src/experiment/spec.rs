@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::Experiment;
+use super::{EngineKind, Experiment, Start};
 use crate::drive::Waveform;
 use crate::model::{Damping, Film, Mount};
 
@@ -38,6 +38,8 @@ impl Experiment {
                 "film": match f.film { Film::BothEnds => "both-ends", Film::RightEnd => "right-end", Film::None => "none" },
                 "film_fraction": f.film_fraction,
             },
+            "engine": match self.engine { EngineKind::Bullet => "bullet", EngineKind::Planar => "planar" },
+            "start": match self.start { Start::Flat => "flat", Start::Settled => "settled" },
             "drive": self.drive_spec(),
             "time_step": self.time_step,
             "steps": self.steps,

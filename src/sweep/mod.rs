@@ -9,6 +9,8 @@
 //! "drive.on_time_s" = [0.004, 0.012, 0.020]
 //! "robot.damping_eta" = { from = 0.008, to = 0.108, count = 5 }
 //! ```
+//!
+//! The runs are those of the planar engine unless the experiment names the other one.
 
 mod rows;
 mod run;
@@ -89,6 +91,10 @@ impl Sweep {
         for setting in settings {
             source.set(setting)?;
         }
+        // Sweeps are what the fast engine is for.
+        if source.parse()?.simulation.engine.is_none() {
+            source.set("simulation.engine=planar")?;
+        }
         if file.measures.is_empty() {
             return Err(fault("measures", format!("is empty; choose from {}", Measures::names().join(", "))));
         }
@@ -114,7 +120,7 @@ impl Sweep {
         }
         let sweep = Self { source, measures: file.measures, axes };
         for index in 0..sweep.len() {
-            sweep.experiment(index)?;
+            experiment::check(&sweep.source_of(index)?)?;
         }
         Ok(sweep)
     }
@@ -186,11 +192,15 @@ impl Sweep {
     /// # Errors
     /// [`ConfigError`] that names the key and value at fault.
     pub fn experiment(&self, index: usize) -> Result<Experiment, ConfigError> {
+        experiment::experiment(&self.source_of(index)?)
+    }
+
+    fn source_of(&self, index: usize) -> Result<Source, ConfigError> {
         let mut source = self.source.clone();
         for (axis, value) in self.axes.iter().zip(self.point(index)) {
             source.set(&format!("{}={value}", axis.key))?;
         }
-        experiment::experiment(&source)
+        Ok(source)
     }
 
     /// Everything that decides the results: two sweeps with the same text give the same rows.

@@ -24,11 +24,17 @@ pub(super) struct Law {
     weight: f64,
     /// 1/R (g).
     stiffness: f64,
+    frictionless: bool,
 }
 
 impl Law {
     pub(super) fn new(time_step: f64, weight: f64, mass: f64) -> Self {
-        Self { time_step, weight, stiffness: mass / SOFTNESS }
+        Self { time_step, weight, stiffness: mass / SOFTNESS, frictionless: false }
+    }
+
+    /// A frictionless floor for displacements: no velocity before, everything near.
+    pub(super) fn statics(stiffness: f64) -> Self {
+        Self { time_step: 1.0, weight: 1.0, stiffness, frictionless: true }
     }
 }
 
@@ -68,13 +74,17 @@ impl Corner {
     pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, friction: f64, law: &Law) -> bool {
         self.arm = arm;
         self.near = gap < FASTEST * law.time_step;
-        self.friction = friction;
+        self.friction = if law.frictionless { 0.0 } else { friction };
         self.impulse = [0.0; 2];
         if !self.near {
             self.touch = Touch::Open;
             return false;
         }
-        self.target[1] = if gap > 0.0 { -gap / law.time_step } else { (-PUSH_OUT * gap / law.time_step).min(PUSH_OUT_SPEED) };
+        self.target[1] = if gap > 0.0 || law.frictionless {
+            -gap / law.time_step
+        } else {
+            (-PUSH_OUT * gap / law.time_step).min(PUSH_OUT_SPEED)
+        };
         true
     }
 

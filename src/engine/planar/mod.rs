@@ -34,6 +34,7 @@
 
 mod contact;
 mod recursion;
+mod statics;
 
 use self::contact::{Corner, Law};
 use self::recursion::{Link, Spatial, solve};
@@ -76,6 +77,8 @@ pub struct PlanarEngine {
     left: [f64; 2],
     root: usize,
     lengths: Vec<f64>,
+    /// Of the mass.
+    shares: Vec<f64>,
     /// Angle of each body above the x axis, counted anticlockwise (rad): minus the sum of the joint angles.
     angles: Vec<f64>,
     /// Rate of each body (rad/s) and velocity of its centre of mass (cm/s).
@@ -101,9 +104,13 @@ impl PlanarEngine {
     /// Builds `robot`, at rest and flat, to be stepped by `time_step` (s).
     ///
     /// # Errors
-    /// [`EngineError::Model`] for a robot that cannot be built.
+    /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::StepTooLong`].
     pub fn new(robot: &Robot, time_step: f64) -> Result<Self, EngineError> {
         robot.check()?;
+        let longest = 0.1 / (analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2));
+        if time_step.is_nan() || time_step > longest {
+            return Err(EngineError::StepTooLong { time_step, longest });
+        }
         let segments = robot.segments();
         let count = segments.len();
         let joint = robot.joint();
@@ -141,6 +148,7 @@ impl PlanarEngine {
             left: [left, 0.0],
             root,
             lengths: segments.iter().map(|s| s.length).collect(),
+            shares: segments.iter().map(|s| s.mass / mass).collect(),
             angles: vec![0.0; count],
             motions: vec![[0.0; 3]; count],
             centre: [moment / mass, 0.0],
@@ -179,15 +187,15 @@ impl PlanarEngine {
         if self.clamped() {
             return self.left;
         }
-        let (mut at, mut moment) = ([0.0; 2], [0.0; 2]);
-        for (link, length) in self.links.iter().zip(&self.lengths) {
+        let (mut at, mut mean) = ([0.0; 2], [0.0; 2]);
+        for ((link, length), share) in self.links.iter().zip(&self.lengths).zip(&self.shares) {
             for k in 0..2 {
                 let along = length * link.along[k];
-                moment[k] += link.mass * (at[k] + 0.5 * along);
+                mean[k] += share * (at[k] + 0.5 * along);
                 at[k] += along;
             }
         }
-        [0, 1].map(|k| self.centre[k] + ahead * self.velocity[k] - moment[k] / self.mass)
+        [0, 1].map(|k| self.centre[k] + ahead * self.velocity[k] - mean[k])
     }
 
     /// Velocity of the left end (cm/s) as the links are turned, from the rates and the velocity of the centre of mass.
@@ -195,19 +203,19 @@ impl PlanarEngine {
         if self.clamped() {
             return [0.0; 2];
         }
-        let (mut at, mut momentum) = ([0.0; 2], [0.0; 2]);
-        for ((link, length), motion) in self.links.iter().zip(&self.lengths).zip(&self.motions) {
+        let (mut at, mut mean) = ([0.0; 2], [0.0; 2]);
+        for (((link, length), share), motion) in self.links.iter().zip(&self.lengths).zip(&self.shares).zip(&self.motions) {
             let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
             for k in 0..2 {
-                momentum[k] += link.mass * (at[k] + 0.5 * across[k]);
+                mean[k] += share * (at[k] + 0.5 * across[k]);
                 at[k] += across[k];
             }
         }
-        [0, 1].map(|k| self.velocity[k] - momentum[k] / self.mass)
+        [0, 1].map(|k| self.velocity[k] - mean[k])
     }
 
     /// Looks which corners may touch during this step; whether any does.
-    fn find_corners(&mut self) -> bool {
+    fn find_corners(&mut self, law: &Law) -> bool {
         let half = self.half_thickness;
         let mut any = false;
         let mut height = self.left_end(0.5 * self.time_step)[1] + half;
@@ -220,7 +228,7 @@ impl PlanarEngine {
                 let reach = from + if k == 0 { 0.0 } else { self.lengths[i] };
                 let gap = height + (reach - from) * link.along[1] + drop;
                 let arm = [reach * link.along[0] + side, reach * link.along[1] + drop];
-                any |= corner.place(arm, gap, self.friction[i], &self.law);
+                any |= corner.place(arm, gap, self.friction[i], law);
             }
             height += self.lengths[i] * link.along[1];
         }
@@ -235,7 +243,7 @@ impl PlanarEngine {
             let end = [velocity[0] - rate * length * link.along[1], velocity[1] + rate * length * link.along[0]];
             let reference = if link.reach < 0.0 { end } else { velocity };
             for corner in pair.iter_mut().filter(|corner| corner.near) {
-                corner.begin([reference[0] - rate * corner.arm[1], reference[1] + rate * corner.arm[0]], &self.law);
+                corner.begin([reference[0] - rate * corner.arm[1], reference[1] + rate * corner.arm[0]], law);
             }
             velocity = end;
         }
@@ -246,20 +254,20 @@ impl PlanarEngine {
     ///
     /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
     /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is minimised along the way there.
-    fn solve_contact(&mut self) -> Result<(), EngineError> {
+    fn solve_contact(&mut self, law: &Law) -> Result<(), EngineError> {
         for iteration in 1..=LARGEST_ITERATIONS {
             self.iterations += 1;
-            solve(&mut self.links, self.root, false, &self.corners, &self.law);
+            solve(&mut self.links, self.root, false, &self.corners, law);
             let mut agrees = true;
             for (corners, link) in self.corners.chunks_exact_mut(2).zip(&self.links) {
                 for corner in corners.iter_mut().filter(|corner| corner.near) {
-                    agrees &= corner.agrees(&link.mean, &self.law);
+                    agrees &= corner.agrees(&link.mean, law);
                 }
             }
             if agrees {
                 return Ok(());
             }
-            let search = if iteration == 1 { Search::Whole } else { self.search() };
+            let search = if iteration == 1 { Search::Whole } else { self.search(law) };
             if search == Search::Done {
                 return Ok(());
             }
@@ -268,7 +276,7 @@ impl PlanarEngine {
                 for (i, link) in self.links.iter().enumerate() {
                     self.iterate[i] = link.mean;
                     for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
-                        corner.accept(&link.mean, &self.law);
+                        corner.accept(&link.mean, law);
                     }
                 }
             }
@@ -280,7 +288,7 @@ impl PlanarEngine {
     /// Minimises the cost between the iterate and the links' mean motion, and moves the iterate there.
     ///
     /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
-    fn search(&mut self) -> Search {
+    fn search(&mut self, law: &Law) -> Search {
         let (mut metric, mut end) = (0.0, 0.0);
         let mut kinetic = 0.0;
         let mut turn_before = 0.0;
@@ -298,13 +306,13 @@ impl PlanarEngine {
             }
             turn_before = d[0];
             for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
-                end += corner.aim(&link.mean, &self.law);
+                end += corner.aim(&link.mean, law);
             }
         }
         let slope_at = |t: f64| {
             let (mut first, mut second) = (end - (1.0 - t) * metric, metric);
             for corner in self.corners.iter().filter(|corner| corner.near) {
-                let (along, slope) = corner.search(t, &self.law);
+                let (along, slope) = corner.search(t, law);
                 first -= along;
                 second -= slope;
             }
@@ -343,7 +351,7 @@ impl PlanarEngine {
                 self.iterate[i][k] += found * (link.mean[k] - self.iterate[i][k]);
             }
             for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
-                corner.go(found, &self.law);
+                corner.go(found, law);
             }
         }
         Search::Part
@@ -462,8 +470,9 @@ impl Engine for PlanarEngine {
         for (link, [rate, x, z]) in self.links.iter_mut().zip(&self.motions) {
             link.momentum = [link.inertia * rate, link.mass * x, link.mass * (z - fall)];
         }
-        if self.find_corners() {
-            self.solve_contact()?;
+        let law = self.law;
+        if self.find_corners(&law) {
+            self.solve_contact(&law)?;
         } else {
             solve(&mut self.links, self.root, self.mount == Mount::Clamped, &[], &self.law);
         }
