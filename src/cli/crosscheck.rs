@@ -112,7 +112,15 @@ fn describe_engines(name: &str, report: &EngineReport) -> String {
     let verdict = if report.passes { "agree" } else { "DIFFER" };
     let parting = report.parting.map_or_else(
         || format!("never further apart than {:.4} mm", report.largest_mm),
-        |p| format!("{:.1} mm apart first at t = {:.4} s, node {}; at most {:.2} mm", 10.0 * PARTED, p.time_s, p.node, report.largest_mm),
+        |p| {
+            format!(
+                "{:.1} mm apart first at t = {:.4} s, node {}; at most {:.2} mm",
+                10.0 * PARTED,
+                p.time_s,
+                p.node,
+                report.largest_mm
+            )
+        },
     );
     let [bullet, planar] = report.time_steps_s;
     let mut text = format!(

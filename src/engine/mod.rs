@@ -38,7 +38,9 @@ pub enum EngineError {
         time: f64,
     },
     /// A time step that the robot's slowest motion cannot be seen with.
-    #[error("the time step {time_step} s is too long for this robot: at most {longest:.2e} s, a tenth of the period of one actuator's first mode")]
+    #[error(
+        "the time step {time_step} s is too long for this robot: at most {longest:.2e} s, a tenth of the period of one actuator's first mode"
+    )]
     StepTooLong {
         /// The step (s).
         time_step: f64,

@@ -110,8 +110,10 @@ pub(super) fn choose(
         before = now;
         step /= 2.0;
     }
-    let reason =
-        format!("no step down to {FINEST} s changes the result by less than {asked}; the last change was {:.1e} at {:.1e} s", last.1, last.0);
+    let reason = format!(
+        "no step down to {FINEST} s changes the result by less than {asked}; the last change was {:.1e} at {:.1e} s",
+        last.1, last.0
+    );
     Err(Fault::new("simulation.step_error", reason).into())
 }
 

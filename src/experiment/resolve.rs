@@ -66,7 +66,9 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
     let s = &config.simulation;
     if let Some(StepConfig::Word(word)) = &s.time_step_s {
         if word != "auto" {
-            return Err(Fault::new("simulation.time_step_s", format!("{word:?} is neither a number of seconds nor \"auto\"")).into());
+            return Err(
+                Fault::new("simulation.time_step_s", format!("{word:?} is neither a number of seconds nor \"auto\"")).into()
+            );
         }
         if engine == EngineKind::Bullet {
             return Err(Fault::new("simulation.time_step_s", "auto needs engine = \"planar\"").into());

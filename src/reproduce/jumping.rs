@@ -22,8 +22,7 @@ const ON_TIME_RECORDS: &str = "simulation.record_every_s=1.0416666666666667e-3";
 /// 1.2 s at 14 Hz, and its measures.
 fn jump(bench: &Bench, bullet: bool) -> Result<(Recording, Measures), StudyError> {
     let settings = [REAL[0], REAL[1], "simulation.duration_s=1.2", "simulation.record_every_s=5e-4"];
-    let (_, run) =
-        if bullet { bench.run_on_bullet("jump-14hz", &settings)? } else { bench.run("jump-14hz", &settings)? };
+    let (_, run) = if bullet { bench.run_on_bullet("jump-14hz", &settings)? } else { bench.run("jump-14hz", &settings)? };
     let measures = Measures::of(&run.recording, Mount::Ground, Some(PERIOD));
     Ok((run.recording, measures))
 }

@@ -109,13 +109,7 @@ impl Findings {
     fn without_result(&mut self, points: &[(f64, f64)]) {
         let lost: Vec<String> = points.iter().filter(|p| !p.1.is_finite()).map(|p| format!("{}", p.0)).collect();
         if !lost.is_empty() {
-            self.compare(
-                "frequencies without a result",
-                "–",
-                format!("{} Hz", lost.join(", ")),
-                "",
-                "The rows on disk say why.",
-            );
+            self.compare("frequencies without a result", "–", format!("{} Hz", lost.join(", ")), "", "The rows on disk say why.");
         }
     }
 }

@@ -2,29 +2,34 @@
 //!
 //! # Scheme
 //!
-//! Angles live at whole steps, rates half a step later (leapfrog). A step solves for the change of the generalised velocities Δ
+//! The state is the angle φ of every body, the centre of mass, and the absolute velocities V of all bodies (rate, and velocity of the centre
+//! of mass). A step of length h solves for the mean motion u of the joints and the floating base,
 //!
 //! ```text
-//! (M + h·D/2 + h²·K/4) Δ = h·(τ(q, v₋) + gravity − C(q, v)) + Jᵀλ,      v₊ = v₋ + Δ,      q₊ = q + h·v₊
+//! Jᵀ M (J u − V) + w h (k (h/2 + η)) u = w h (τ(θ) + gravity) + w λ,      V⁺ = V + (J u − V)/w,      φ⁺ = φ + h u
 //! ```
 //!
-//! with the springs taken at the mean (q₋ + 2q + q₊)/4 and the dampers at the mean of both rates: of second order between impacts, stable at
-//! any step, with no energy made. K and D are diagonal in the joints, so they only add to each joint's articulated inertia, and the
-//! articulated-body recursion solves a step in one walk down the chain and one back.
+//! with the velocities J at the pose that the old rates lead to in the middle of the step. Springs, dampers and drives act at that middle. M
+//! is constant, for V are the bodies' own velocities; k and η are diagonal in the joints, so they only add to each joint's articulated
+//! inertia, and the articulated-body recursion solves a step in one walk down the chain and one back ([`recursion`]).
 //!
-//! The centre of mass is the floating coordinate; its momentum changes by gravity and contact alone.
+//! With w = 1/2 this is the midpoint rule: of second order where nothing touches, stable at any step, and it makes no energy, whatever the
+//! pose in J: V⁺ᵀMV⁺ − VᵀMV = 2 h u·(forces), springs give back what they took, and of a robot that is not clamped gravity does too, for
+//! its height is the centre of mass's own coordinate. (A clamped robot's gravity closes to third order in h per step.) w is a little more than 1/2, see
+//! [`NUMERICAL_DAMPING`]; what that takes is known and on the books.
 //!
 //! # Contact
 //!
-//! The two bottom corners of every box may touch the floor. In end-of-step velocities, with a look-ahead of one step
+//! The two bottom corners of every box may touch the floor. In velocities v⁺ at the end of the step, with a look-ahead of one step,
 //!
 //! ```text
-//! 0 ≤ v_n + gap/h  ⊥  λ_n ≥ 0,        |λ_t| ≤ μ λ_n
+//! 0 ≤ v_n⁺ + gap/h  ⊥  λ_n ≥ 0,        |λ_t| ≤ μ λ_n
 //! ```
 //!
 //! so a corner never passes the floor: it stops on it, without bounce. Friction is the convex model of Anitescu: its minimum is unique, and
-//! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. Newton's method over the corners' states (open, sticking, sliding) puts
-//! active corners into the recursion as terms of their bodies' inertia.
+//! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. Taking that lift off again by fixed-point iterations (De Saxcé) was tried: it does
+//! not converge for the frictions of films (4.0), and changes heights of jumps (friction 1.0) by less than the step does. Newton's method over the corners' states (open,
+//! sticking, sliding) puts active corners into the recursion as terms of their bodies' inertia.
 //!
 //! # References
 //!
@@ -69,6 +74,8 @@ pub struct PlanarEngine {
     time_step: f64,
     stable_step: f64,
     gravity: f64,
+    /// Along x and z (cm/s²).
+    pull: [f64; 2],
     mass: f64,
     half_thickness: f64,
     /// Of each body with the floor.
@@ -142,6 +149,7 @@ impl PlanarEngine {
             time_step,
             stable_step: analytic::stable_step(robot),
             gravity: robot.material.gravity,
+            pull: [0.0, -robot.material.gravity],
             mass,
             half_thickness: 0.5 * thickness,
             friction: segments.iter().map(|s| (s.friction * robot.friction.ground).min(LARGEST_FRICTION)).collect(),
@@ -168,6 +176,11 @@ impl PlanarEngine {
     /// Contact problems' Newton iterations over all steps so far; 0 for steps without contact.
     pub fn iterations(&self) -> u64 {
         self.iterations
+    }
+
+    /// Lets the floor rise by `angle` (rad) along +x: in its axes gravity is g (−sin, −cos). The books of energy know level floors only.
+    pub fn set_slope(&mut self, angle: f64) {
+        self.pull = [-self.gravity * angle.sin(), -self.gravity * angle.cos()];
     }
 
     fn clamped(&self) -> bool {
@@ -466,9 +479,9 @@ impl Engine for PlanarEngine {
                 self.links[i + 1].torque = -torque;
             }
         }
-        let fall = share * self.gravity;
+        let pull = self.pull.map(|part| share * part);
         for (link, [rate, x, z]) in self.links.iter_mut().zip(&self.motions) {
-            link.momentum = [link.inertia * rate, link.mass * x, link.mass * (z - fall)];
+            link.momentum = [link.inertia * rate, link.mass * (x + pull[0]), link.mass * (z + pull[1])];
         }
         let law = self.law;
         if self.find_corners(&law) {
@@ -519,6 +532,8 @@ impl Engine for PlanarEngine {
         self.numerical_loss
     }
 
+    /// Angles of the bodies (rad, anticlockwise), then rate (rad/s) and velocity of the centre of mass (cm/s) of each, then centre of mass and
+    /// velocity of the robot, then the corners' states.
     fn save(&self) -> Result<Vec<f64>, EngineError> {
         let mut state = self.angles.clone();
         state.extend(self.motions.iter().flatten());

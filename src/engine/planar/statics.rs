@@ -58,7 +58,7 @@ impl PlanarEngine {
         for _ in 0..LARGEST_STEPS {
             self.turn(0.0);
             for (link, body) in self.links.iter_mut().zip(bodies) {
-                link.momentum = [0.0, 0.0, -body.0 * self.gravity];
+                link.momentum = [0.0, body.0 * self.pull[0], body.0 * self.pull[1]];
             }
             for i in 0..self.angles.len() - 1 {
                 let angle = self.angles[i] - self.angles[i + 1];
