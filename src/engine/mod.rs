@@ -73,7 +73,7 @@ pub enum EngineError {
 }
 
 /// The joints at the start of a step.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, PartialEq, Default)]
 pub struct JointState {
     /// Angles (rad).
     pub angles: Vec<f64>,
@@ -83,6 +83,22 @@ pub struct JointState {
     pub torques: Vec<f64>,
     /// Voltage on each joint: the actuator's, divided by m (V).
     pub motor_voltages: Vec<f64>,
+}
+
+impl Clone for JointState {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Without allocating where the lengths are the same.
+    fn clone_from(&mut self, source: &Self) {
+        self.angles.clone_from(&source.angles);
+        self.rates.clone_from(&source.rates);
+        self.torques.clone_from(&source.torques);
+        self.motor_voltages.clone_from(&source.motor_voltages);
+    }
 }
 
 /// How often Bullet's limit on velocities was reached.

@@ -50,6 +50,23 @@ pub(super) enum Touch {
     SlideBackward,
 }
 
+/// A coefficient of friction μ, and what the law needs of it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Grip {
+    friction: f64,
+    /// 1/(1 + μ²).
+    share: f64,
+    /// (μ, 1)/√(1 + μ²): direction of the impulse on a corner that is pushed forward.
+    slide: [f64; 2],
+}
+
+impl Grip {
+    pub(super) fn new(friction: f64) -> Self {
+        let share = 1.0 / (1.0 + friction * friction);
+        Self { friction, share, slide: [friction * share.sqrt(), share.sqrt()] }
+    }
+}
+
 /// One bottom corner.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Corner {
@@ -58,7 +75,7 @@ pub(super) struct Corner {
     /// Whether it may touch during this step.
     pub(super) near: bool,
     touch: Touch,
-    friction: f64,
+    grip: Grip,
     /// Mean velocity w* that stops it on the floor at the end (cm/s).
     target: [f64; 2],
     /// Mean velocity of the iterate (cm/s).
@@ -71,10 +88,10 @@ pub(super) struct Corner {
 
 impl Corner {
     /// Looks at the corner at `arm` from its body's reference point, `gap` (cm) above the floor.
-    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, friction: f64, law: &Law) -> bool {
+    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, grip: Grip, law: &Law) -> bool {
         self.arm = arm;
         self.near = gap < FASTEST * law.time_step;
-        self.friction = if law.frictionless { 0.0 } else { friction };
+        self.grip = grip;
         self.impulse = [0.0; 2];
         if !self.near {
             self.touch = Touch::Open;
@@ -102,21 +119,21 @@ impl Corner {
     /// The law: state and impulse at the mean velocity `v`.
     fn law(&self, v: [f64; 2], law: &Law) -> (Touch, [f64; 2]) {
         let pull = [0, 1].map(|k| (self.target[k] - v[k]) * law.stiffness);
-        let mu = self.friction;
+        let mu = self.grip.friction;
         if pull[0].abs() <= mu * pull[1] {
             (Touch::Stick, pull)
         } else if pull[1] + mu * pull[0].abs() <= 0.0 {
             (Touch::Open, [0.0; 2])
         } else {
-            let normal = (pull[1] + mu * pull[0].abs()) / (1.0 + mu * mu);
+            let normal = (pull[1] + mu * pull[0].abs()) * self.grip.share;
             (if pull[0] > 0.0 { Touch::SlideForward } else { Touch::SlideBackward }, [mu * normal * pull[0].signum(), normal])
         }
     }
 
     /// Direction of the impulse of a sliding corner.
     fn slide(&self, touch: Touch) -> [f64; 2] {
-        let scale = 1.0 / (1.0 + self.friction * self.friction).sqrt();
-        [if touch == Touch::SlideForward { self.friction * scale } else { -self.friction * scale }, scale]
+        let [x, z] = self.grip.slide;
+        [if touch == Touch::SlideForward { x } else { -x }, z]
     }
 
     /// a·b through the law's piece: −dλ/dw = stiffness · (0, all, or the part along the slide).

@@ -41,7 +41,7 @@ mod contact;
 mod recursion;
 mod statics;
 
-use self::contact::{Corner, Law};
+use self::contact::{Corner, Grip, Law};
 use self::recursion::{Link, Spatial, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -54,6 +54,10 @@ const LARGEST_FRICTION: f64 = 10.0;
 /// a velocity that springs and dampers dictate keeps −(1 − w)/w of an alternation per step. For a mode of angular frequency ω this adds
 /// h (w − 1/2) ω/2 to the damping ratio, of second order in h.
 const NUMERICAL_DAMPING: f64 = 50.0;
+/// The links' directions are computed anew every so many steps and when they turn by more than this (rad), for which the series in
+/// [`turned`] are exact to the last digit.
+const EXACT_EVERY: u64 = 64;
+const LARGEST_SERIES: f64 = 0.1;
 /// Newton steps after which a contact problem is given up.
 const LARGEST_ITERATIONS: u32 = 100;
 /// The search ends where the slope of the cost is this share of the one it began with.
@@ -79,7 +83,7 @@ pub struct PlanarEngine {
     mass: f64,
     half_thickness: f64,
     /// Of each body with the floor.
-    friction: Vec<f64>,
+    grips: Vec<Grip>,
     /// Left end of a clamped chain (cm).
     left: [f64; 2],
     root: usize,
@@ -94,6 +98,9 @@ pub struct PlanarEngine {
     centre: [f64; 2],
     velocity: [f64; 2],
     links: Vec<Link>,
+    /// Angles that the links' directions are of.
+    posed: Vec<f64>,
+    kept: Vec<[f64; 2]>,
     corners: Vec<Corner>,
     /// Mean motions of the left ends in the iterate of the contact problem.
     iterate: Vec<Spatial>,
@@ -152,7 +159,7 @@ impl PlanarEngine {
             pull: [0.0, -robot.material.gravity],
             mass,
             half_thickness: 0.5 * thickness,
-            friction: segments.iter().map(|s| (s.friction * robot.friction.ground).min(LARGEST_FRICTION)).collect(),
+            grips: segments.iter().map(|s| Grip::new((s.friction * robot.friction.ground).min(LARGEST_FRICTION))).collect(),
             left: [left, 0.0],
             root,
             lengths: segments.iter().map(|s| s.length).collect(),
@@ -162,6 +169,8 @@ impl PlanarEngine {
             centre: [moment / mass, 0.0],
             velocity: [0.0; 2],
             links,
+            posed: vec![0.0; count],
+            kept: vec![[0.0; 2]; count],
             corners: vec![Corner::default(); if robot.mount == Mount::Ground { 2 * count } else { 0 }],
             iterate: vec![[0.0; 3]; count],
             law: Law::new(time_step, weight, mass),
@@ -187,12 +196,33 @@ impl PlanarEngine {
         self.mount == Mount::Clamped
     }
 
-    /// Turns the links to where they are `ahead` (s) of the state if all goes on at its rates.
-    fn turn(&mut self, ahead: f64) {
-        for ((link, angle), motion) in self.links.iter_mut().zip(&self.angles).zip(&self.motions) {
-            let (sin, cos) = (angle + ahead * motion[0]).sin_cos();
-            link.along = [cos, sin];
+    /// Turns the links to where they are in the middle of the step if all goes on at its rates.
+    ///
+    /// They turn on from where they were, by the series of sine and cosine, which is several times faster than computing both anew. That
+    /// loses a last digit at times, so it is done every [`EXACT_EVERY`] steps, and where they turn far.
+    fn turn(&mut self) {
+        let ahead = 0.5 * self.time_step;
+        let exact = self.step.is_multiple_of(EXACT_EVERY);
+        let states = self.angles.iter().zip(&self.motions).zip(&mut self.posed);
+        for (link, ((angle, motion), posed)) in self.links.iter_mut().zip(states) {
+            let to = angle + ahead * motion[0];
+            let by = to - *posed;
+            *posed = to;
+            link.along = if exact || by.abs() > LARGEST_SERIES { [to.cos(), to.sin()] } else { turned(link.along, by) };
         }
+    }
+
+    /// Shows `look` the links as they stand now.
+    fn posed<T>(&mut self, look: impl FnOnce(&Self) -> T) -> T {
+        for ((link, kept), angle) in self.links.iter_mut().zip(&mut self.kept).zip(&self.angles) {
+            *kept = link.along;
+            link.along = [angle.cos(), angle.sin()];
+        }
+        let seen = look(self);
+        for (link, kept) in self.links.iter_mut().zip(&self.kept) {
+            link.along = *kept;
+        }
+        seen
     }
 
     /// Left end of the chain (cm) as the links are turned, `ahead` (s) of the state.
@@ -241,7 +271,7 @@ impl PlanarEngine {
                 let reach = from + if k == 0 { 0.0 } else { self.lengths[i] };
                 let gap = height + (reach - from) * link.along[1] + drop;
                 let arm = [reach * link.along[0] + side, reach * link.along[1] + drop];
-                any |= corner.place(arm, gap, self.friction[i], law);
+                any |= corner.place(arm, gap, self.grips[i], law);
             }
             height += self.lengths[i] * link.along[1];
         }
@@ -371,6 +401,16 @@ impl PlanarEngine {
     }
 }
 
+/// A direction turned by a small angle (rad), at unit length.
+fn turned([x, z]: [f64; 2], by: f64) -> [f64; 2] {
+    let s = by * by;
+    let sin = by * (1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0))));
+    let cos = 1.0 - s / 2.0 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)));
+    let (x, z) = (x * cos - z * sin, x * sin + z * cos);
+    let scale = 1.5 - 0.5 * (x * x + z * z);
+    [x * scale, z * scale]
+}
+
 /// How a search along a Newton step ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Search {
@@ -414,61 +454,64 @@ impl Engine for PlanarEngine {
 
     /// Positions and velocities of the same time, unlike the reference's.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
-        self.turn(0.0);
-        let mut velocity = self.left_velocity();
-        let mut position = self.left_end(0.0);
-        let ends = self.links.iter().zip(&self.motions).zip(&self.lengths).map(|((link, motion), length)| {
-            let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
-            (link.along.map(|a| a * length), across)
-        });
-        let rows = positions.chunks_exact_mut(3).zip(velocities.chunks_exact_mut(3));
-        for ((node, node_velocity), (along, across)) in rows.zip(ends.chain([([0.0; 2], [0.0; 2])])) {
-            node.copy_from_slice(&[position[0], 0.0, position[1]]);
-            node_velocity.copy_from_slice(&[velocity[0], 0.0, velocity[1]]);
-            for k in 0..2 {
-                position[k] += along[k];
-                velocity[k] += across[k];
+        self.posed(|engine| {
+            let mut velocity = engine.left_velocity();
+            let mut position = engine.left_end(0.0);
+            let ends = engine.links.iter().zip(&engine.motions).zip(&engine.lengths).map(|((link, motion), length)| {
+                let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
+                (link.along.map(|a| a * length), across)
+            });
+            let rows = positions.chunks_exact_mut(3).zip(velocities.chunks_exact_mut(3));
+            for ((node, node_velocity), (along, across)) in rows.zip(ends.chain([([0.0; 2], [0.0; 2])])) {
+                node.copy_from_slice(&[position[0], 0.0, position[1]]);
+                node_velocity.copy_from_slice(&[velocity[0], 0.0, velocity[1]]);
+                for k in 0..2 {
+                    position[k] += along[k];
+                    velocity[k] += across[k];
+                }
             }
-        }
+        });
         Ok(())
     }
 
     fn base(&mut self) -> Result<PlanarBase, EngineError> {
-        self.turn(0.0);
-        let rate = self.motions[0][0];
-        let half = self.links[0].along.map(|along| 0.5 * self.lengths[0] * along);
-        let (position, velocity) = (self.left_end(0.0), self.left_velocity());
-        Ok(PlanarBase {
-            position: [0, 1].map(|k| position[k] + half[k]),
-            pitch: -self.angles[0],
-            velocity: [velocity[0] - rate * half[1], velocity[1] + rate * half[0]],
-            pitch_rate: -rate,
-        })
+        Ok(self.posed(|engine| {
+            let rate = engine.motions[0][0];
+            let half = engine.links[0].along.map(|along| 0.5 * engine.lengths[0] * along);
+            let (position, velocity) = (engine.left_end(0.0), engine.left_velocity());
+            PlanarBase {
+                position: [0, 1].map(|k| position[k] + half[k]),
+                pitch: -engine.angles[0],
+                velocity: [velocity[0] - rate * half[1], velocity[1] + rate * half[0]],
+                pitch_rate: -rate,
+            }
+        }))
     }
 
     fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
         contacts.clear();
-        self.turn(0.0);
-        let mut left = self.left_end(0.0);
-        for (i, (pair, link)) in self.corners.chunks_exact(2).zip(&self.links).enumerate() {
-            let right = [0, 1].map(|k| left[k] + self.lengths[i] * link.along[k]);
-            for corner in pair {
-                let impulse = corner.impulse(&self.law);
-                if impulse[1] > 0.0 {
-                    let reference = if link.reach < 0.0 { right } else { left };
-                    let position = [0, 1].map(|k| reference[k] + corner.arm[k]);
-                    contacts.push(Contact { link: i, position, force: impulse.map(|part| part / self.time_step) });
+        self.posed(|engine| {
+            let mut left = engine.left_end(0.0);
+            for (i, (pair, link)) in engine.corners.chunks_exact(2).zip(&engine.links).enumerate() {
+                let right = [0, 1].map(|k| left[k] + engine.lengths[i] * link.along[k]);
+                for corner in pair {
+                    let impulse = corner.impulse(&engine.law);
+                    if impulse[1] > 0.0 {
+                        let reference = if link.reach < 0.0 { right } else { left };
+                        let position = [0, 1].map(|k| reference[k] + corner.arm[k]);
+                        contacts.push(Contact { link: i, position, force: impulse.map(|part| part / engine.time_step) });
+                    }
                 }
+                left = right;
             }
-            left = right;
-        }
+        });
         Ok(())
     }
 
     fn advance(&mut self) -> Result<(), EngineError> {
         let h = self.time_step;
         let share = self.weight * h;
-        self.turn(0.5 * h);
+        self.turn();
         let joints = self.state.angles.iter().zip(&self.state.motor_voltages);
         for (i, (angle, volts)) in joints.enumerate() {
             // Spring and drive at the start; the implicit part adds what the mean rate makes.
@@ -533,19 +576,21 @@ impl Engine for PlanarEngine {
     }
 
     /// Angles of the bodies (rad, anticlockwise), then rate (rad/s) and velocity of the centre of mass (cm/s) of each, then centre of mass and
-    /// velocity of the robot, then the corners' states.
+    /// velocity of the robot, then the corners' states, then the directions of the last step's middle.
     fn save(&self) -> Result<Vec<f64>, EngineError> {
         let mut state = self.angles.clone();
         state.extend(self.motions.iter().flatten());
         state.extend(self.centre);
         state.extend(self.velocity);
         state.extend(self.corners.iter().map(Corner::saved));
+        state.extend(&self.posed);
+        state.extend(self.links.iter().flat_map(|link| link.along));
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
         let count = self.angles.len();
-        if state.len() != 4 * count + 4 + self.corners.len() || state.iter().any(|value| !value.is_finite()) {
+        if state.len() != 7 * count + 4 + self.corners.len() || state.iter().any(|value| !value.is_finite()) {
             return Err(EngineError::State);
         }
         let (angles, rest) = state.split_at(count);
@@ -555,8 +600,14 @@ impl Engine for PlanarEngine {
             motion.copy_from_slice(saved);
         }
         (self.centre, self.velocity) = ([rest[0], rest[1]], [rest[2], rest[3]]);
-        for (corner, saved) in self.corners.iter_mut().zip(&rest[4..]) {
+        let (corners, rest) = rest[4..].split_at(self.corners.len());
+        for (corner, saved) in self.corners.iter_mut().zip(corners) {
             corner.restore(*saved);
+        }
+        let (posed, along) = rest.split_at(count);
+        self.posed.copy_from_slice(posed);
+        for (link, saved) in self.links.iter_mut().zip(along.chunks_exact(2)) {
+            link.along.copy_from_slice(saved);
         }
         self.step = step;
         Ok(())

@@ -100,34 +100,31 @@ impl Articulated {
         let inverse = 1.0 / (c[0] + link.implicit);
         let rest = link.torque + force[0];
         (link.column, link.inverse, link.rest) = (c, inverse, rest);
-        let share = c.map(|part| part * inverse);
+        // The products do not wait for the division.
         for k in 0..3 {
-            force[k] -= share[k] * rest;
+            force[k] -= c[k] * rest * inverse;
         }
-        inertia[0] -= share[0] * c[0];
-        inertia[1] -= share[0] * c[1];
-        inertia[2] -= share[0] * c[2];
-        inertia[3] -= share[1] * c[1];
-        inertia[4] -= share[1] * c[2];
-        inertia[5] -= share[2] * c[2];
+        inertia[0] -= c[0] * c[0] * inverse;
+        inertia[1] -= c[0] * c[1] * inverse;
+        inertia[2] -= c[0] * c[2] * inverse;
+        inertia[3] -= c[1] * c[1] * inverse;
+        inertia[4] -= c[1] * c[2] * inverse;
+        inertia[5] -= c[2] * c[2] * inverse;
     }
 
-    /// The motion x of a free body: inertia · x = force, by Cholesky's decomposition.
+    /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned.
     fn motion(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
-        // From the translation down to the turn, which is the best conditioned order for a long chain.
-        let a = i22.sqrt();
-        let (b, c) = (i12 / a, i02 / a);
-        let d = (i11 - b * b).sqrt();
-        let e = (i01 - b * c) / d;
-        let f = (i00 - c * c - e * e).sqrt();
-        let y2 = self.force[2] / a;
-        let y1 = (self.force[1] - b * y2) / d;
-        let y0 = (self.force[0] - c * y2 - e * y1) / f;
-        let x0 = y0 / f;
-        let x1 = (y1 - e * x0) / d;
-        let x2 = (y2 - c * x0 - b * x1) / a;
-        [x0, x1, x2]
+        let [turn, x, z] = self.force;
+        let a = 1.0 / i22;
+        let (b, c) = (i12 * a, i02 * a);
+        let d = 1.0 / (i11 - b * i12);
+        let cross = i01 - b * i02;
+        let e = cross * d;
+        let pull = x - b * z;
+        let spin = (turn - c * z - e * pull) / (i00 - c * i02 - e * cross);
+        let along = d * pull - e * spin;
+        [spin, along, a * z - b * along - c * spin]
     }
 }
 

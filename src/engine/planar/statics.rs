@@ -5,7 +5,7 @@
 //! implicit terms and a frictionless floor. What is left out is small beside k, so the steps shrink by a constant factor. Without
 //! friction the equilibrium of a robot on the floor does not depend on how it got there; the centre of mass keeps its x.
 
-use super::contact::Law;
+use super::contact::{Grip, Law};
 use super::recursion::solve;
 use super::{Corner, EngineError, PlanarEngine};
 use crate::model::Mount;
@@ -40,10 +40,12 @@ impl PlanarEngine {
         }
         self.motions.fill([0.0; 3]);
         self.velocity = [0.0; 2];
+        let grips = std::mem::replace(&mut self.grips, vec![Grip::new(0.0); self.links.len()]);
         let settled = self.settle_in_steps(voltages, &law, &dynamic);
         for (link, (mass, inertia, implicit)) in self.links.iter_mut().zip(dynamic) {
             (link.mass, link.inertia, link.implicit) = (mass, inertia, implicit);
         }
+        self.grips = grips;
         for corner in &mut self.corners {
             *corner = Corner::default();
         }
@@ -56,7 +58,10 @@ impl PlanarEngine {
     fn settle_in_steps(&mut self, voltages: &[f64], law: &Law, bodies: &[(f64, f64, f64)]) -> Result<bool, EngineError> {
         let m = self.motors_per_actuator;
         for _ in 0..LARGEST_STEPS {
-            self.turn(0.0);
+            for (link, angle) in self.links.iter_mut().zip(&self.angles) {
+                link.along = [angle.cos(), angle.sin()];
+            }
+            self.posed.copy_from_slice(&self.angles);
             for (link, body) in self.links.iter_mut().zip(bodies) {
                 link.momentum = [0.0, body.0 * self.pull[0], body.0 * self.pull[1]];
             }
