@@ -102,10 +102,10 @@ fn a_reproduction_makes_its_page_tables_and_figures() {
     let jump = &results["results"][2]["comparisons"];
     let number = |text: &serde_json::Value| text.as_str().unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
     assert!((7.5..=8.5).contains(&number(&jump[0]["ours"])), "{jump}");
-    assert_eq!(number(&jump[1]["ours"]), 2.0, "{jump}");
-    let kinds: Vec<_> =
-        results["results"][3]["comparisons"].as_array().unwrap().iter().map(|c| c["ours"] != "does not occur").collect();
-    assert_eq!(kinds, [true; 3]);
+    assert!(jump[1]["ours"].as_str().unwrap().ends_with("on Bullet"), "{jump}");
+    assert_eq!(number(&jump[2]["ours"]), 2.0, "{jump}");
+    let kinds = results["results"][3]["comparisons"].as_array().unwrap().iter().take(3);
+    assert!(kinds.map(|c| c["ours"] != "does not occur").eq([true; 3]));
     assert!(fs::read_to_string(out.join("table.md")).unwrap().contains("jump-14hz"));
 }
 

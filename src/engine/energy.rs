@@ -18,8 +18,10 @@ use super::{Contact, Engine, EngineError, JointState};
 use crate::actuator::PiezoJoint;
 use crate::model::Robot;
 
-/// Steps between two looks at the state functions. Work is added up in every step.
+/// Steps between two looks at the state functions, and of an engine that works at the middle of steps, whose contact is not suspected.
+/// Work is added up in every step.
 const LOOK_EVERY: u64 = 8;
+const LOOK_EVERY_MIDPOINT: u64 = 64;
 
 /// Pose and velocity of the base's centre of mass in the plane of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -169,22 +171,29 @@ impl Books {
             let b = &self.before;
             let mut electrical = 0.0;
             let mut heat = 0.0;
-            let midpoint = engine.midpoint();
-            for i in 0..joints.rates.len() {
-                let (turn, rate) = if midpoint {
-                    let turn = joints.angles[i] - b.angles[i];
-                    (turn, turn / self.time_step)
-                } else {
-                    (0.5 * (b.rates[i] + joints.rates[i]) * self.time_step, b.rates[i])
-                };
-                electrical += self.joint.rest_angle_per_volt * b.motor_voltages[i] * turn;
-                heat += rate * turn;
+            let per_volt = self.joint.rest_angle_per_volt;
+            if engine.midpoint() {
+                // Torques and rates of the middle of the step: the rate is the turn over the step.
+                for ((now, before), volts) in joints.angles.iter().zip(&b.angles).zip(&b.motor_voltages) {
+                    let turn = now - before;
+                    electrical += volts * turn;
+                    heat += turn * turn;
+                }
+                electrical *= per_volt;
+                heat /= self.time_step;
+            } else {
+                for i in 0..joints.rates.len() {
+                    let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
+                    electrical += per_volt * b.motor_voltages[i] * turn;
+                    heat += b.rates[i] * turn;
+                }
             }
             self.balance.electrical_in_erg += k * electrical;
             self.balance.damping_out_erg += k * eta * heat;
         }
         self.before.clone_from(joints);
-        if !self.begun || engine.step().is_multiple_of(LOOK_EVERY) {
+        let every = if engine.midpoint() { LOOK_EVERY_MIDPOINT } else { LOOK_EVERY };
+        if !self.begun || engine.step().is_multiple_of(every) {
             self.look(engine)?;
             self.begun = true;
         }

@@ -28,6 +28,11 @@ pub(super) struct Law {
 }
 
 impl Law {
+    /// Height (cm) below which a corner may touch during a step.
+    pub(super) fn reach(&self) -> f64 {
+        FASTEST * self.time_step
+    }
+
     pub(super) fn new(time_step: f64, weight: f64, mass: f64) -> Self {
         Self { time_step, weight, stiffness: mass / SOFTNESS, frictionless: false }
     }
@@ -72,8 +77,6 @@ impl Grip {
 pub(super) struct Corner {
     /// From the body's reference point (cm).
     pub(super) arm: [f64; 2],
-    /// Whether it may touch during this step.
-    pub(super) near: bool,
     touch: Touch,
     grip: Grip,
     /// Mean velocity w* that stops it on the floor at the end (cm/s).
@@ -87,22 +90,25 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    /// Looks at the corner at `arm` from its body's reference point, `gap` (cm) above the floor.
-    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, grip: Grip, law: &Law) -> bool {
+    /// A corner at `arm` from its body's reference point, `gap` (cm) above the floor.
+    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, grip: Grip, law: &Law) {
         self.arm = arm;
-        self.near = gap < FASTEST * law.time_step;
         self.grip = grip;
-        self.impulse = [0.0; 2];
-        if !self.near {
-            self.touch = Touch::Open;
-            return false;
-        }
         self.target[1] = if gap > 0.0 || law.frictionless {
             -gap / law.time_step
         } else {
             (-PUSH_OUT * gap / law.time_step).min(PUSH_OUT_SPEED)
         };
-        true
+    }
+
+    /// A corner that nothing touches.
+    pub(super) fn open(&mut self) {
+        self.touch = Touch::Open;
+        self.impulse = [0.0; 2];
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        self.touch == Touch::Open
     }
 
     /// Turns the target for the end of the step into one for the mean, from the velocity `before` (cm/s) the step.

@@ -38,11 +38,16 @@
 //! 2110.10107 (regularised cones and Newton's method).
 
 mod contact;
+mod floor;
+mod newton;
 mod recursion;
 mod statics;
 
-use self::contact::{Corner, Grip, Law};
-use self::recursion::{Link, Spatial, solve};
+use wide::f64x2;
+
+use self::contact::Law;
+use self::floor::{Floor, next};
+use self::recursion::{Rung, Spatials, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
@@ -58,17 +63,6 @@ const NUMERICAL_DAMPING: f64 = 50.0;
 /// [`turned`] are exact to the last digit.
 const EXACT_EVERY: u64 = 64;
 const LARGEST_SERIES: f64 = 0.1;
-/// Newton steps after which a contact problem is given up.
-const LARGEST_ITERATIONS: u32 = 100;
-/// The search ends where the slope of the cost is this share of the one it began with.
-const SEARCH_ENOUGH: f64 = 0.1;
-/// Steps of the search along one Newton step; it ends much earlier.
-const LARGEST_SEARCH: u32 = 60;
-
-/// A Newton step is the last if the cost falls by less than these shares of m (g h)² and of the kinetic energy: the first is a velocity of
-/// 10⁻⁶ of what gravity gives in a step, the second what rounding leaves.
-const DONE_OF_GRAVITY: f64 = 1e-12;
-const DONE_OF_KINETIC: f64 = 1e-18;
 
 /// The robot as a planar chain.
 pub struct PlanarEngine {
@@ -81,29 +75,20 @@ pub struct PlanarEngine {
     /// Along x and z (cm/s²).
     pull: [f64; 2],
     mass: f64,
-    half_thickness: f64,
-    /// Of each body with the floor.
-    grips: Vec<Grip>,
-    /// Left end of a clamped chain (cm).
-    left: [f64; 2],
+    /// Number of bodies, and which one is the root.
+    count: usize,
     root: usize,
     lengths: Vec<f64>,
-    /// Of the mass.
-    shares: Vec<f64>,
-    /// Angle of each body above the x axis, counted anticlockwise (rad): minus the sum of the joint angles.
-    angles: Vec<f64>,
-    /// Rate of each body (rad/s) and velocity of its centre of mass (cm/s).
-    motions: Vec<Spatial>,
-    /// Centre of mass (cm) and its velocity (cm/s).
+    rungs: Vec<Rung>,
+    /// Directions put aside while others are looked at.
+    kept: Vec<[f64x2; 2]>,
+    /// Centre of mass (cm) and its velocity (cm/s). A clamped chain has its left end here.
     centre: [f64; 2],
     velocity: [f64; 2],
-    links: Vec<Link>,
-    /// Angles that the links' directions are of.
-    posed: Vec<f64>,
-    kept: Vec<[f64; 2]>,
-    corners: Vec<Corner>,
-    /// Mean motions of the left ends in the iterate of the contact problem.
-    iterate: Vec<Spatial>,
+    /// None but for robots on the ground.
+    floor: Option<Floor>,
+    /// Mean motions of the reference points in the iterate of the contact problem.
+    iterate: Vec<Spatials>,
     law: Law,
     weight: f64,
     step: u64,
@@ -132,15 +117,21 @@ impl PlanarEngine {
         let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
         let weight = (0.5 + NUMERICAL_DAMPING * time_step).min(1.0);
         let implicit = weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step);
-        let root = if robot.mount == Mount::Clamped { 0 } else { count / 2 };
-        let links = segments
-            .iter()
-            .enumerate()
-            .map(|(i, s)| {
-                let side = if i < root { -1.0 } else { 1.0 };
-                Link::new(s.length, side, s.mass, s.mass / 12.0 * (s.length.powi(2) + thickness.powi(2)), implicit)
-            })
-            .collect();
+        let clamped = robot.mount == Mount::Clamped;
+        let root = if clamped { 0 } else { count / 2 };
+        let mut rungs = vec![Rung::empty(); root.max(count - 1 - root) + 1];
+        let mut frictions = vec![[0.0; 2]; rungs.len()];
+        for (i, segment) in segments.iter().enumerate() {
+            let (rung, lane) = place(i, root);
+            let at = &mut rungs[rung];
+            put(&mut at.mass, lane, segment.mass);
+            put(&mut at.share, lane, segment.mass / mass);
+            put(&mut at.inertia, lane, segment.mass / 12.0 * (segment.length.powi(2) + thickness.powi(2)));
+            put(&mut at.reach, lane, if i < root { -segment.length } else { segment.length });
+            put(&mut at.stiffness, lane, joint.stiffness);
+            put(&mut at.implicit, lane, implicit);
+            frictions[rung][lane] = (segment.friction * robot.friction.ground).min(LARGEST_FRICTION);
+        }
         // The base's centre stands at the origin, as in Bullet.
         let left = -0.5 * segments[0].length;
         let (mut at, mut moment) = (left, 0.0);
@@ -158,21 +149,15 @@ impl PlanarEngine {
             gravity: robot.material.gravity,
             pull: [0.0, -robot.material.gravity],
             mass,
-            half_thickness: 0.5 * thickness,
-            grips: segments.iter().map(|s| Grip::new((s.friction * robot.friction.ground).min(LARGEST_FRICTION))).collect(),
-            left: [left, 0.0],
+            count,
             root,
-            lengths: segments.iter().map(|s| s.length).collect(),
-            shares: segments.iter().map(|s| s.mass / mass).collect(),
-            angles: vec![0.0; count],
-            motions: vec![[0.0; 3]; count],
-            centre: [moment / mass, 0.0],
+            lengths: segments.iter().map(|segment| segment.length).collect(),
+            kept: vec![[f64x2::ZERO; 2]; rungs.len()],
+            centre: if clamped { [left, 0.0] } else { [moment / mass, 0.0] },
             velocity: [0.0; 2],
-            links,
-            posed: vec![0.0; count],
-            kept: vec![[0.0; 2]; count],
-            corners: vec![Corner::default(); if robot.mount == Mount::Ground { 2 * count } else { 0 }],
-            iterate: vec![[0.0; 3]; count],
+            floor: (robot.mount == Mount::Ground).then(|| Floor::new(&frictions, 0.5 * thickness)),
+            iterate: vec![Spatials::default(); rungs.len()],
+            rungs,
             law: Law::new(time_step, weight, mass),
             weight,
             step: 0,
@@ -196,247 +181,171 @@ impl PlanarEngine {
         self.mount == Mount::Clamped
     }
 
+    /// One number of body `i`.
+    fn of_body(&self, i: usize, what: impl Fn(&Rung) -> f64x2) -> f64 {
+        let (rung, lane) = place(i, self.root);
+        what(&self.rungs[rung]).to_array()[lane]
+    }
+
     /// Turns the links to where they are in the middle of the step if all goes on at its rates.
     ///
     /// They turn on from where they were, by the series of sine and cosine, which is several times faster than computing both anew. That
     /// loses a last digit at times, so it is done every [`EXACT_EVERY`] steps, and where they turn far.
     fn turn(&mut self) {
-        let ahead = 0.5 * self.time_step;
+        let ahead = f64x2::splat(0.5 * self.time_step);
         let exact = self.step.is_multiple_of(EXACT_EVERY);
-        let states = self.angles.iter().zip(&self.motions).zip(&mut self.posed);
-        for (link, ((angle, motion), posed)) in self.links.iter_mut().zip(states) {
-            let to = angle + ahead * motion[0];
-            let by = to - *posed;
-            *posed = to;
-            link.along = if exact || by.abs() > LARGEST_SERIES { [to.cos(), to.sin()] } else { turned(link.along, by) };
+        for rung in &mut self.rungs {
+            let to = rung.angle + ahead * rung.motion[0];
+            let by = to - rung.posed;
+            rung.posed = to;
+            let [a, b] = by.to_array();
+            rung.along = if exact || a.abs() > LARGEST_SERIES || b.abs() > LARGEST_SERIES {
+                direction(to)
+            } else {
+                turned(rung.along, by)
+            };
+            rung.across = rung.along.map(|along| rung.reach * along);
         }
     }
 
     /// Shows `look` the links as they stand now.
     fn posed<T>(&mut self, look: impl FnOnce(&Self) -> T) -> T {
-        for ((link, kept), angle) in self.links.iter_mut().zip(&mut self.kept).zip(&self.angles) {
-            *kept = link.along;
-            link.along = [angle.cos(), angle.sin()];
+        for (rung, kept) in self.rungs.iter_mut().zip(&mut self.kept) {
+            *kept = rung.along;
+            rung.along = direction(rung.angle);
+            rung.across = rung.along.map(|along| rung.reach * along);
         }
         let seen = look(self);
-        for (link, kept) in self.links.iter_mut().zip(&self.kept) {
-            link.along = *kept;
+        for (rung, kept) in self.rungs.iter_mut().zip(&self.kept) {
+            rung.along = *kept;
+            rung.across = rung.along.map(|along| rung.reach * along);
         }
         seen
     }
 
-    /// Left end of the chain (cm) as the links are turned, `ahead` (s) of the state.
-    fn left_end(&self, ahead: f64) -> [f64; 2] {
-        if self.clamped() {
-            return self.left;
-        }
-        let (mut at, mut mean) = ([0.0; 2], [0.0; 2]);
-        for ((link, length), share) in self.links.iter().zip(&self.lengths).zip(&self.shares) {
-            for k in 0..2 {
-                let along = length * link.along[k];
-                mean[k] += share * (at[k] + 0.5 * along);
-                at[k] += along;
+    /// Mean over the mass of what each rung says of its reference points, walked from the root's, and of half of what it says of its other
+    /// ends.
+    fn mean(&self, across: impl Fn(&Rung) -> [f64x2; 2]) -> [f64; 2] {
+        let (mut at, mut sum) = ([f64x2::ZERO; 2], [f64x2::ZERO; 2]);
+        for (k, rung) in self.rungs.iter().enumerate() {
+            let across = across(rung);
+            for i in 0..2 {
+                sum[i] += rung.share * (at[i] + f64x2::HALF * across[i]);
+                at[i] = next(at[i], across[i], k);
             }
         }
+        sum.map(|part| part.reduce_add())
+    }
+
+    /// Where the root's reference point is (cm), as the links are turned, `ahead` (s) of the state.
+    fn root_position(&self, ahead: f64) -> [f64; 2] {
+        if self.clamped() {
+            return self.centre;
+        }
+        let mean = self.mean(|rung| rung.across);
         [0, 1].map(|k| self.centre[k] + ahead * self.velocity[k] - mean[k])
     }
 
-    /// Velocity of the left end (cm/s) as the links are turned, from the rates and the velocity of the centre of mass.
-    fn left_velocity(&self) -> [f64; 2] {
+    /// Its velocity (cm/s), from the rates and the velocity of the centre of mass.
+    fn root_velocity(&self) -> [f64; 2] {
         if self.clamped() {
             return [0.0; 2];
         }
-        let (mut at, mut mean) = ([0.0; 2], [0.0; 2]);
-        for (((link, length), share), motion) in self.links.iter().zip(&self.lengths).zip(&self.shares).zip(&self.motions) {
-            let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
-            for k in 0..2 {
-                mean[k] += share * (at[k] + 0.5 * across[k]);
-                at[k] += across[k];
-            }
-        }
+        let mean = self.mean(|rung| [-rung.motion[0] * rung.across[1], rung.motion[0] * rung.across[0]]);
         [0, 1].map(|k| self.velocity[k] - mean[k])
     }
 
-    /// Looks which corners may touch during this step; whether any does.
-    fn find_corners(&mut self, law: &Law) -> bool {
-        let half = self.half_thickness;
-        let mut any = false;
-        let mut height = self.left_end(0.5 * self.time_step)[1] + half;
-        for (i, (pair, link)) in self.corners.chunks_exact_mut(2).zip(&self.links).enumerate() {
-            // The side of the box that looks down, and where its ends are from the reference point.
-            let down = half.copysign(link.along[0]);
-            let (side, drop) = (down * link.along[1], -down * link.along[0]);
-            let from = if link.reach < 0.0 { link.reach } else { 0.0 };
-            for (k, corner) in pair.iter_mut().enumerate() {
-                let reach = from + if k == 0 { 0.0 } else { self.lengths[i] };
-                let gap = height + (reach - from) * link.along[1] + drop;
-                let arm = [reach * link.along[0] + side, reach * link.along[1] + drop];
-                any |= corner.place(arm, gap, self.grips[i], law);
+    /// Position and velocity of the left end of the chain, as the links are turned, with the state's velocities.
+    fn left_end(&self) -> ([f64; 2], [f64; 2]) {
+        let (mut position, mut velocity) = (self.root_position(0.0), self.root_velocity());
+        // The left arm's other ends are left ends.
+        for rung in self.rungs.iter().skip(1) {
+            if rung.mass.to_array()[0] > 0.0 {
+                let [x, z] = rung.across.map(|part| part.to_array()[0]);
+                let rate = rung.motion[0].to_array()[0];
+                position = [position[0] + x, position[1] + z];
+                velocity = [velocity[0] - rate * z, velocity[1] + rate * x];
             }
-            height += self.lengths[i] * link.along[1];
         }
-        if !any {
-            return false;
-        }
-        let mut velocity = self.left_velocity();
-        for (((pair, link), motion), length) in
-            self.corners.chunks_exact_mut(2).zip(&self.links).zip(&self.motions).zip(&self.lengths)
-        {
-            let rate = motion[0];
-            let end = [velocity[0] - rate * length * link.along[1], velocity[1] + rate * length * link.along[0]];
-            let reference = if link.reach < 0.0 { end } else { velocity };
-            for corner in pair.iter_mut().filter(|corner| corner.near) {
-                corner.begin([reference[0] - rate * corner.arm[1], reference[1] + rate * corner.arm[0]], law);
-            }
-            velocity = end;
-        }
-        true
+        (position, velocity)
     }
 
-    /// Solves the step's mean motion into the links, with Newton's method over the corners' states.
-    ///
-    /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
-    /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is minimised along the way there.
-    fn solve_contact(&mut self, law: &Law) -> Result<(), EngineError> {
-        for iteration in 1..=LARGEST_ITERATIONS {
-            self.iterations += 1;
-            solve(&mut self.links, self.root, false, &self.corners, law);
-            let mut agrees = true;
-            for (corners, link) in self.corners.chunks_exact_mut(2).zip(&self.links) {
-                for corner in corners.iter_mut().filter(|corner| corner.near) {
-                    agrees &= corner.agrees(&link.mean, law);
-                }
-            }
-            if agrees {
-                return Ok(());
-            }
-            let search = if iteration == 1 { Search::Whole } else { self.search(law) };
-            if search == Search::Done {
-                return Ok(());
-            }
-            if search == Search::Whole {
-                // The states that it was solved for were a guess: any motion will do for an iterate.
-                for (i, link) in self.links.iter().enumerate() {
-                    self.iterate[i] = link.mean;
-                    for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
-                        corner.accept(&link.mean, law);
-                    }
-                }
-            }
-        }
-        let time = self.step as f64 * self.time_step;
-        Err(EngineError::NotConverged { iterations: LARGEST_ITERATIONS, step: self.step, time })
+    /// Body `i` from its left end to its right one (cm).
+    fn body_vector(&self, i: usize) -> [f64; 2] {
+        [0, 1].map(|k| self.lengths[i] * self.of_body(i, |rung| rung.along[k]))
     }
 
-    /// Minimises the cost between the iterate and the links' mean motion, and moves the iterate there.
-    ///
-    /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
-    fn search(&mut self, law: &Law) -> Search {
-        let (mut metric, mut end) = (0.0, 0.0);
-        let mut kinetic = 0.0;
-        let mut turn_before = 0.0;
-        for (i, link) in self.links.iter().enumerate() {
-            let from = self.iterate[i];
-            let d = [0, 1, 2].map(|k| link.mean[k] - from[k]);
-            let half = 0.5 * link.reach * d[0];
-            let (x, z) = (d[1] - half * link.along[1], d[2] + half * link.along[0]);
-            metric += link.mass * (x * x + z * z) + link.inertia * d[0] * d[0];
-            let [turn, x, z] = link.mean_of_centre();
-            kinetic += link.mass * (x * x + z * z) + link.inertia * turn * turn;
-            if i > 0 {
-                // All joints are alike.
-                metric += link.implicit * (d[0] - turn_before).powi(2);
-            }
-            turn_before = d[0];
-            for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
-                end += corner.aim(&link.mean, law);
-            }
+    /// Sets the joints' parts of the step's right side: `share` (s) of their torques at the angles as they are.
+    fn load_torques(&mut self, share: f64) {
+        let share = f64x2::splat(-share);
+        let mut inner = f64x2::splat(self.rungs[0].angle.to_array()[0]);
+        for rung in self.rungs.iter_mut().skip(1) {
+            // Spring and drive at the start; the implicit part adds what the mean rate makes.
+            rung.torque = share * rung.stiffness * (rung.angle - inner - rung.rest_angle);
+            inner = rung.angle;
         }
-        let slope_at = |t: f64| {
-            let (mut first, mut second) = (end - (1.0 - t) * metric, metric);
-            for corner in self.corners.iter().filter(|corner| corner.near) {
-                let (along, slope) = corner.search(t, law);
-                first -= along;
-                second -= slope;
-            }
-            (first, second)
-        };
-        let weight = self.gravity * self.time_step;
-        let start = -slope_at(0.0).0;
-        if start <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic {
-            return Search::Done;
-        }
-        let enough = SEARCH_ENOUGH * start;
-        let (mut low, mut high, mut t) = (0.0, 1.0, 1.0);
-        let mut found = 1.0;
-        for _ in 0..LARGEST_SEARCH {
-            let (first, second) = slope_at(t);
-            found = t;
-            if first > 0.0 {
-                high = t;
-            } else {
-                low = t;
-            }
-            if first.abs() <= enough || (t == 1.0 && first < 0.0) {
-                break;
-            }
-            let next = t - first / second;
-            t = if next > low && next < high { next } else { 0.5 * (low + high) };
-            if t == found || high - low <= f64::EPSILON * high {
-                break;
-            }
-        }
-        if found == 1.0 {
-            return Search::Whole;
-        }
-        for (i, link) in self.links.iter().enumerate() {
-            for k in 0..3 {
-                self.iterate[i][k] += found * (link.mean[k] - self.iterate[i][k]);
-            }
-            for corner in self.corners[2 * i..2 * i + 2].iter_mut().filter(|corner| corner.near) {
-                corner.go(found, law);
-            }
-        }
-        Search::Part
     }
 }
 
-/// A direction turned by a small angle (rad), at unit length.
-fn turned([x, z]: [f64; 2], by: f64) -> [f64; 2] {
+/// Rung and lane of body `i` of a chain with this root.
+fn place(i: usize, root: usize) -> (usize, usize) {
+    if i <= root { (root - i, 0) } else { (i - root, 1) }
+}
+
+fn put(lanes: &mut f64x2, lane: usize, value: f64) {
+    lanes.as_mut_array()[lane] = value;
+}
+
+/// Directions of two angles.
+fn direction(angle: f64x2) -> [f64x2; 2] {
+    let angle = angle.to_array();
+    [f64x2::new(angle.map(f64::cos)), f64x2::new(angle.map(f64::sin))]
+}
+
+/// Two directions turned by small angles (rad), at unit length.
+#[inline(always)]
+fn turned([x, z]: [f64x2; 2], by: f64x2) -> [f64x2; 2] {
+    let c = f64x2::splat;
     let s = by * by;
-    let sin = by * (1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0))));
-    let cos = 1.0 - s / 2.0 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)));
+    let sin =
+        by * (c(1.0) - s * c(1.0 / 6.0) * (c(1.0) - s * c(0.05) * (c(1.0) - s * c(1.0 / 42.0) * (c(1.0) - s * c(1.0 / 72.0)))));
+    let cos = c(1.0) - s * c(0.5) * (c(1.0) - s * c(1.0 / 12.0) * (c(1.0) - s * c(1.0 / 30.0) * (c(1.0) - s * c(1.0 / 56.0))));
     let (x, z) = (x * cos - z * sin, x * sin + z * cos);
-    let scale = 1.5 - 0.5 * (x * x + z * z);
+    let scale = c(1.5) - c(0.5) * (x * x + z * z);
     [x * scale, z * scale]
-}
-
-/// How a search along a Newton step ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Search {
-    /// The cost cannot fall any more.
-    Done,
-    /// The lowest cost is at the end of the step.
-    Whole,
-    /// It is on the way.
-    Part,
 }
 
 impl Engine for PlanarEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
-        let m = self.motors_per_actuator as f64;
-        let mut sum = 0.0;
-        for i in 0..self.state.angles.len() {
-            // Joint angles count the other way round.
-            let angle = self.angles[i] - self.angles[i + 1];
-            let rate = self.motions[i][0] - self.motions[i + 1][0];
-            let volts = voltages[i / self.motors_per_actuator] / m;
-            self.state.angles[i] = angle;
-            self.state.rates[i] = rate;
-            self.state.motor_voltages[i] = volts;
-            self.state.torques[i] = self.joint.torque(angle, rate, volts);
-            sum += 0.0 * angle + 0.0 * rate;
+        let m = self.motors_per_actuator;
+        let state = &mut self.state;
+        for (joints, volts) in state.motor_voltages.chunks_exact_mut(m).zip(voltages) {
+            joints.fill(volts / m as f64);
         }
+        let lag = f64x2::splat(self.joint.damping_time);
+        let first = &self.rungs[0];
+        let mut inner = [first.angle, first.motion[0]].map(|value| f64x2::splat(value.to_array()[0]));
+        let mut check = f64x2::ZERO;
+        for (k, rung) in self.rungs.iter_mut().enumerate().skip(1) {
+            // The joint of the left arm's body is on its right, that of the right arm's on its left.
+            let (left, right) = (self.root.checked_sub(k), self.root + k - 1);
+            let volts = |joint: Option<usize>| joint.and_then(|i| state.motor_voltages.get(i)).copied().unwrap_or(0.0);
+            // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
+            let per_volt = self.joint.rest_angle_per_volt;
+            rung.rest_angle = f64x2::new([per_volt * volts(left), -per_volt * volts(Some(right))]);
+            let (angle, rate) = (rung.angle - inner[0], rung.motion[0] - inner[1]);
+            inner = [rung.angle, rung.motion[0]];
+            check += f64x2::ZERO * (angle + rate);
+            let torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
+            for (joint, lane, sign) in [(left, 0, 1.0), (Some(right), 1, -1.0)] {
+                if let Some(i) = joint.filter(|i| *i < state.angles.len()) {
+                    state.angles[i] = sign * angle.to_array()[lane];
+                    state.rates[i] = sign * rate.to_array()[lane];
+                    state.torques[i] = -sign * torque.to_array()[lane];
+                }
+            }
+        }
+        let mut sum = check.reduce_add();
         sum += 0.0 * (self.centre[0] + self.centre[1] + self.velocity[0] + self.velocity[1]);
         if sum == 0.0 {
             return Ok(());
@@ -455,19 +364,16 @@ impl Engine for PlanarEngine {
     /// Positions and velocities of the same time, unlike the reference's.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
         self.posed(|engine| {
-            let mut velocity = engine.left_velocity();
-            let mut position = engine.left_end(0.0);
-            let ends = engine.links.iter().zip(&engine.motions).zip(&engine.lengths).map(|((link, motion), length)| {
-                let across = [-motion[0] * length * link.along[1], motion[0] * length * link.along[0]];
-                (link.along.map(|a| a * length), across)
-            });
+            let (mut position, mut velocity) = engine.left_end();
             let rows = positions.chunks_exact_mut(3).zip(velocities.chunks_exact_mut(3));
-            for ((node, node_velocity), (along, across)) in rows.zip(ends.chain([([0.0; 2], [0.0; 2])])) {
+            for (i, (node, node_velocity)) in rows.enumerate() {
                 node.copy_from_slice(&[position[0], 0.0, position[1]]);
                 node_velocity.copy_from_slice(&[velocity[0], 0.0, velocity[1]]);
-                for k in 0..2 {
-                    position[k] += along[k];
-                    velocity[k] += across[k];
+                if i < engine.count {
+                    let [x, z] = engine.body_vector(i);
+                    let rate = engine.of_body(i, |rung| rung.motion[0]);
+                    position = [position[0] + x, position[1] + z];
+                    velocity = [velocity[0] - rate * z, velocity[1] + rate * x];
                 }
             }
         });
@@ -476,13 +382,13 @@ impl Engine for PlanarEngine {
 
     fn base(&mut self) -> Result<PlanarBase, EngineError> {
         Ok(self.posed(|engine| {
-            let rate = engine.motions[0][0];
-            let half = engine.links[0].along.map(|along| 0.5 * engine.lengths[0] * along);
-            let (position, velocity) = (engine.left_end(0.0), engine.left_velocity());
+            let (position, velocity) = engine.left_end();
+            let [x, z] = engine.body_vector(0).map(|part| 0.5 * part);
+            let rate = engine.of_body(0, |rung| rung.motion[0]);
             PlanarBase {
-                position: [0, 1].map(|k| position[k] + half[k]),
-                pitch: -engine.angles[0],
-                velocity: [velocity[0] - rate * half[1], velocity[1] + rate * half[0]],
+                position: [position[0] + x, position[1] + z],
+                pitch: -engine.of_body(0, |rung| rung.angle),
+                velocity: [velocity[0] - rate * z, velocity[1] + rate * x],
                 pitch_rate: -rate,
             }
         }))
@@ -491,13 +397,16 @@ impl Engine for PlanarEngine {
     fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
         contacts.clear();
         self.posed(|engine| {
-            let mut left = engine.left_end(0.0);
-            for (i, (pair, link)) in engine.corners.chunks_exact(2).zip(&engine.links).enumerate() {
-                let right = [0, 1].map(|k| left[k] + engine.lengths[i] * link.along[k]);
-                for corner in pair {
+            let Some(floor) = &engine.floor else { return };
+            let (mut left, _) = engine.left_end();
+            for i in 0..engine.count {
+                let vector = engine.body_vector(i);
+                let right = [left[0] + vector[0], left[1] + vector[1]];
+                let (rung, lane) = place(i, engine.root);
+                let reference = if i < engine.root { right } else { left };
+                for corner in floor.of_body(rung, lane) {
                     let impulse = corner.impulse(&engine.law);
                     if impulse[1] > 0.0 {
-                        let reference = if link.reach < 0.0 { right } else { left };
                         let position = [0, 1].map(|k| reference[k] + corner.arm[k]);
                         contacts.push(Contact { link: i, position, force: impulse.map(|part| part / engine.time_step) });
                     }
@@ -512,43 +421,32 @@ impl Engine for PlanarEngine {
         let h = self.time_step;
         let share = self.weight * h;
         self.turn();
-        let joints = self.state.angles.iter().zip(&self.state.motor_voltages);
-        for (i, (angle, volts)) in joints.enumerate() {
-            // Spring and drive at the start; the implicit part adds what the mean rate makes.
-            let torque = share * self.joint.torque(*angle, 0.0, *volts);
-            if i < self.root {
-                self.links[i].torque = torque;
-            } else {
-                self.links[i + 1].torque = -torque;
+        self.load_torques(share);
+        let pull = self.pull.map(|part| f64x2::splat(share * part));
+        for rung in &mut self.rungs {
+            let [rate, x, z] = rung.motion;
+            rung.load([rung.inertia * rate, rung.mass * (x + pull[0]), rung.mass * (z + pull[1])]);
+        }
+        if !self.solve_on_floor(&self.law.clone())? {
+            solve(&mut self.rungs, self.mount == Mount::Clamped, None);
+        }
+        let (step, per_weight) = (f64x2::splat(h), f64x2::splat(1.0 / self.weight));
+        let (mut momentum, mut changed) = ([f64x2::ZERO; 2], f64x2::ZERO);
+        for rung in &mut self.rungs {
+            let mean = rung.mean_of_centre();
+            rung.angle += step * mean[0];
+            let change: Spatials = std::array::from_fn(|k| (mean[k] - rung.motion[k]) * per_weight);
+            for (motion, change) in rung.motion.iter_mut().zip(change) {
+                *motion += change;
             }
+            changed += rung.inertia * change[0] * change[0] + rung.mass * (change[1] * change[1] + change[2] * change[2]);
+            momentum[0] += rung.share * rung.motion[1];
+            momentum[1] += rung.share * rung.motion[2];
         }
-        let pull = self.pull.map(|part| share * part);
-        for (link, [rate, x, z]) in self.links.iter_mut().zip(&self.motions) {
-            link.momentum = [link.inertia * rate, link.mass * (x + pull[0]), link.mass * (z + pull[1])];
-        }
-        let law = self.law;
-        if self.find_corners(&law) {
-            self.solve_contact(&law)?;
-        } else {
-            solve(&mut self.links, self.root, self.mount == Mount::Clamped, &[], &self.law);
-        }
-        let per_weight = 1.0 / self.weight;
-        let (mut momentum, mut change_squared) = ([0.0; 2], 0.0);
-        for ((link, motion), angle) in self.links.iter().zip(&mut self.motions).zip(&mut self.angles) {
-            let mean = link.mean_of_centre();
-            *angle += h * mean[0];
-            let change = [0, 1, 2].map(|k| (mean[k] - motion[k]) * per_weight);
-            for k in 0..3 {
-                motion[k] += change[k];
-            }
-            change_squared += link.inertia * change[0] * change[0] + link.mass * (change[1] * change[1] + change[2] * change[2]);
-            momentum[0] += link.mass * motion[1];
-            momentum[1] += link.mass * motion[2];
-        }
-        self.numerical_loss += (self.weight - 0.5) * change_squared;
+        self.numerical_loss += (self.weight - 0.5) * changed.reduce_add();
         if !self.clamped() {
-            for k in 0..2 {
-                let after = momentum[k] / self.mass;
+            for (k, share) in momentum.into_iter().enumerate() {
+                let after = share.reduce_add();
                 self.centre[k] += h * (self.velocity[k] + self.weight * (after - self.velocity[k]));
                 self.velocity[k] = after;
             }
@@ -562,13 +460,11 @@ impl Engine for PlanarEngine {
     }
 
     fn kinetic_energy(&self) -> Option<f64> {
-        Some(
-            self.links
-                .iter()
-                .zip(&self.motions)
-                .map(|(link, [rate, x, z])| 0.5 * (link.mass * (x * x + z * z) + link.inertia * rate * rate))
-                .sum(),
-        )
+        let twice = |rung: &Rung| {
+            let [rate, x, z] = rung.motion;
+            rung.mass * (x * x + z * z) + rung.inertia * rate * rate
+        };
+        Some(0.5 * self.rungs.iter().map(twice).fold(f64x2::ZERO, |a, b| a + b).reduce_add())
     }
 
     fn numerical_loss(&self) -> f64 {
@@ -576,38 +472,41 @@ impl Engine for PlanarEngine {
     }
 
     /// Angles of the bodies (rad, anticlockwise), then rate (rad/s) and velocity of the centre of mass (cm/s) of each, then centre of mass and
-    /// velocity of the robot, then the corners' states, then the directions of the last step's middle.
+    /// velocity of the robot, then the directions of the last step's middle with their angles, then the corners' states.
     fn save(&self) -> Result<Vec<f64>, EngineError> {
-        let mut state = self.angles.clone();
-        state.extend(self.motions.iter().flatten());
+        let bodies = || 0..self.count;
+        let mut state: Vec<f64> = bodies().map(|i| self.of_body(i, |rung| rung.angle)).collect();
+        state.extend(bodies().flat_map(|i| [0, 1, 2].map(|k| self.of_body(i, |rung| rung.motion[k]))));
         state.extend(self.centre);
         state.extend(self.velocity);
-        state.extend(self.corners.iter().map(Corner::saved));
-        state.extend(&self.posed);
-        state.extend(self.links.iter().flat_map(|link| link.along));
+        state.extend(bodies().flat_map(|i| [0, 1].map(|k| self.of_body(i, |rung| rung.along[k]))));
+        state.extend(bodies().map(|i| self.of_body(i, |rung| rung.posed)));
+        state.extend(self.floor.iter().flat_map(Floor::saved));
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
-        let count = self.angles.len();
-        if state.len() != 7 * count + 4 + self.corners.len() || state.iter().any(|value| !value.is_finite()) {
+        let count = self.count;
+        let corners = self.floor.iter().flat_map(Floor::saved).count();
+        if state.len() != 7 * count + 4 + corners || state.iter().any(|value| !value.is_finite()) {
             return Err(EngineError::State);
         }
         let (angles, rest) = state.split_at(count);
         let (motions, rest) = rest.split_at(3 * count);
-        self.angles.copy_from_slice(angles);
-        for (motion, saved) in self.motions.iter_mut().zip(motions.chunks_exact(3)) {
-            motion.copy_from_slice(saved);
+        let (centre, rest) = rest.split_at(4);
+        let (along, rest) = rest.split_at(2 * count);
+        let (posed, corners) = rest.split_at(count);
+        for i in 0..count {
+            let (rung, lane) = place(i, self.root);
+            let at = &mut self.rungs[rung];
+            put(&mut at.angle, lane, angles[i]);
+            put(&mut at.posed, lane, posed[i]);
+            (0..3).for_each(|k| put(&mut at.motion[k], lane, motions[3 * i + k]));
+            (0..2).for_each(|k| put(&mut at.along[k], lane, along[2 * i + k]));
         }
-        (self.centre, self.velocity) = ([rest[0], rest[1]], [rest[2], rest[3]]);
-        let (corners, rest) = rest[4..].split_at(self.corners.len());
-        for (corner, saved) in self.corners.iter_mut().zip(corners) {
-            corner.restore(*saved);
-        }
-        let (posed, along) = rest.split_at(count);
-        self.posed.copy_from_slice(posed);
-        for (link, saved) in self.links.iter_mut().zip(along.chunks_exact(2)) {
-            link.along.copy_from_slice(saved);
+        (self.centre, self.velocity) = ([centre[0], centre[1]], [centre[2], centre[3]]);
+        if let Some(floor) = &mut self.floor {
+            floor.restore(corners);
         }
         self.step = step;
         Ok(())

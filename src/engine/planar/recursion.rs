@@ -1,105 +1,151 @@
-//! The articulated-body recursion in the plane.
+//! The articulated-body recursion in the plane, two arms at a time.
+//!
+//! The chain hangs on its root: the first body if it is clamped, the one in the middle otherwise. The bodies at the same distance from the
+//! root stand on one [`Rung`], the left arm's in lane 0 and the right arm's in lane 1, and both arms are walked in the same instructions. The
+//! root has rung 0, lane 0. Where an arm is shorter its lane holds a body without mass, which changes nothing.
 //!
 //! A spatial vector is (turn, x, z): of a motion (ω, v) of a body's reference point, of a force (moment about it, f). Turns count
-//! anticlockwise.
-//!
-//! The chain hangs on its root: the first body if it is clamped, the one in the middle otherwise, so that two arms are walked side by side
-//! and the processor works on both at once. A body's reference point is its end towards the root; the root's is its left end.
+//! anticlockwise. A body's reference point is its end towards the root; the root's is its left end.
 
-use super::contact::{Corner, Law};
+use wide::f64x2;
+
+use super::contact::Law;
+use super::floor::Floor;
 
 /// Turn, x, z.
 pub(super) type Spatial = [f64; 3];
+/// The same of two bodies.
+pub(super) type Spatials = [f64x2; 3];
 
-/// One body: what stays and what the step at hand needs.
+/// Two bodies: what stays, their state, and what the step at hand needs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Link {
-    pub(super) mass: f64,
+pub(super) struct Rung {
+    pub(super) mass: f64x2,
+    /// Share of the robot's mass.
+    pub(super) share: f64x2,
     /// About the centre of mass (g·cm²).
-    pub(super) inertia: f64,
+    pub(super) inertia: f64x2,
     /// From the reference point to the other end (cm), negative on the left arm.
-    pub(super) reach: f64,
+    pub(super) reach: f64x2,
+    /// Of the joint at the reference point (dyn·cm/rad); none where there is no body.
+    pub(super) stiffness: f64x2,
     /// What spring and damper of the joint at the reference point add to that joint's inertia.
-    pub(super) implicit: f64,
-    /// Direction of the body, from its left end to its right one.
-    pub(super) along: [f64; 2],
-    /// Momentum (about the centre of mass) that the mean motion is to have, and the joint's part of it.
-    pub(super) momentum: Spatial,
-    pub(super) torque: f64,
+    pub(super) implicit: f64x2,
+    /// Angle above the x axis (rad), counted anticlockwise.
+    pub(super) angle: f64x2,
+    /// Rate (rad/s) and velocity of the centre of mass (cm/s).
+    pub(super) motion: Spatials,
+    /// Angle at which the joint's spring is at rest, body towards the root to this one (rad).
+    pub(super) rest_angle: f64x2,
+    /// The angle that `along`, the direction from left end to right one, is of, and the other end less the reference point (cm).
+    pub(super) posed: f64x2,
+    pub(super) along: [f64x2; 2],
+    pub(super) across: [f64x2; 2],
+    /// Momentum about the reference point that the mean motion is to have, and the joint's part of it.
+    pub(super) momentum: Spatials,
+    pub(super) torque: f64x2,
     // Of the walk to the root: inertia·S, 1/D, the joint's own part.
-    column: Spatial,
-    inverse: f64,
-    rest: f64,
+    column: Spatials,
+    inverse: f64x2,
+    rest: f64x2,
     /// Mean motion of the reference point over the step.
-    pub(super) mean: Spatial,
+    pub(super) mean: Spatials,
 }
 
-impl Link {
-    /// A body of `length` and `mass` (g) and its joint; `side` is −1 on the left arm.
-    pub(super) fn new(length: f64, side: f64, mass: f64, inertia: f64, implicit: f64) -> Self {
-        Self { reach: side * length, mass, inertia, implicit, along: [1.0, 0.0], ..Self::default() }
+impl Rung {
+    /// Bodies without mass, whose joints do nothing.
+    pub(super) fn empty() -> Self {
+        Self { implicit: f64x2::ONE, along: [f64x2::ONE, f64x2::ZERO], ..Self::default() }
     }
 
-    /// The other end's velocity less the reference point's, for a unit turn.
-    fn across(&self) -> [f64; 2] {
-        [-self.reach * self.along[1], self.reach * self.along[0]]
+    /// Velocity of the centres of mass relative to the reference points, for a unit turn, is (−z, x) of this.
+    fn half(&self) -> [f64x2; 2] {
+        self.across.map(|part| part * f64x2::HALF)
     }
 
-    /// Mean motion of the other end.
-    fn mean_of_end(&self) -> Spatial {
+    /// Mean motion of the other ends.
+    #[inline(always)]
+    fn mean_of_end(&self) -> Spatials {
         let [turn, x, z] = self.mean;
-        let [wx, wz] = self.across();
-        [turn, x + turn * wx, z + turn * wz]
+        [turn, x - turn * self.across[1], z + turn * self.across[0]]
     }
 
-    /// Mean motion of the centre of mass.
-    pub(super) fn mean_of_centre(&self) -> Spatial {
-        let [turn, x, z] = self.mean;
-        let [wx, wz] = self.across();
-        let half = 0.5 * turn;
-        [turn, x + half * wx, z + half * wz]
+    /// Mean motion of the centres of mass.
+    #[inline(always)]
+    pub(super) fn mean_of_centre(&self) -> Spatials {
+        self.of_centre(self.mean)
+    }
+
+    /// The motion of the centres of mass where that of the reference points is `motion`.
+    #[inline(always)]
+    pub(super) fn of_centre(&self, motion: Spatials) -> Spatials {
+        let [turn, x, z] = motion;
+        let half = self.half();
+        [turn, x - turn * half[1], z + turn * half[0]]
+    }
+
+    /// Puts the momentum `about_centre` about the reference point.
+    #[inline(always)]
+    pub(super) fn load(&mut self, about_centre: Spatials) {
+        let [turn, x, z] = about_centre;
+        let half = self.half();
+        self.momentum = [turn + half[0] * z - half[1] * x, x, z];
     }
 }
 
-/// Inertia (00, 01, 02, 11, 12, 22) and force at a point.
+/// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms.
+#[derive(Debug, Clone, Copy, Default)]
+struct Arms {
+    inertia: [f64x2; 6],
+    force: Spatials,
+}
+
+/// The same of one body.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Articulated {
     pub(super) inertia: [f64; 6],
     pub(super) force: Spatial,
 }
 
-impl Articulated {
-    /// Moves from a link's other end to its reference point and adds the link and its corners.
+impl Arms {
+    /// Moves from a rung's other ends to its reference points and adds the rung itself.
     #[inline(always)]
-    fn take(&mut self, link: &Link, corners: &[Corner], law: &Law) {
-        let [wx, wz] = link.across();
+    fn take(&mut self, rung: &Rung) {
         let Self { inertia, force } = self;
+        let [wx, wz] = [-rung.across[1], rung.across[0]];
         let [_, i01, i02, i11, i12, i22] = *inertia;
         let (bx, bz) = (i11 * wx + i12 * wz, i12 * wx + i22 * wz);
         // The body: its centre of mass lies half way.
-        let (hx, hz) = (0.5 * wx, 0.5 * wz);
-        inertia[0] += 2.0 * (wx * i01 + wz * i02) + wx * bx + wz * bz + link.inertia + link.mass * (hx * hx + hz * hz);
-        inertia[1] += bx + link.mass * hx;
-        inertia[2] += bz + link.mass * hz;
-        inertia[3] += link.mass;
-        inertia[5] += link.mass;
-        let [turn, x, z] = link.momentum;
-        force[0] += wx * force[1] + wz * force[2] + turn + hx * x + hz * z;
-        force[1] += x;
-        force[2] += z;
-        for corner in corners {
-            corner.add_to(self, law);
+        let (hx, hz) = (f64x2::HALF * wx, f64x2::HALF * wz);
+        let (mx, mz) = (rung.mass * hx, rung.mass * hz);
+        inertia[0] += (wx * (i01 + i01 + bx) + wz * (i02 + i02 + bz)) + (rung.inertia + mx * hx + mz * hz);
+        inertia[1] += bx + mx;
+        inertia[2] += bz + mz;
+        inertia[3] += rung.mass;
+        inertia[5] += rung.mass;
+        force[0] += (wx * force[1] + wz * force[2]) + rung.momentum[0];
+        force[1] += rung.momentum[1];
+        force[2] += rung.momentum[2];
+    }
+
+    /// Adds what corners do to the bodies of a rung.
+    fn touch(&mut self, by: [Articulated; 2]) {
+        for (k, inertia) in self.inertia.iter_mut().enumerate() {
+            *inertia += f64x2::new([by[0].inertia[k], by[1].inertia[k]]);
+        }
+        for (k, force) in self.force.iter_mut().enumerate() {
+            *force += f64x2::new([by[0].force[k], by[1].force[k]]);
         }
     }
 
-    /// What of it is felt through the joint at the link's reference point.
+    /// What of it is felt through the joints at the rung's reference points.
     #[inline(always)]
-    fn through_joint(&mut self, link: &mut Link) {
+    fn through_joints(&mut self, rung: &mut Rung) {
         let Self { inertia, force } = self;
         let c = [inertia[0], inertia[1], inertia[2]];
-        let inverse = 1.0 / (c[0] + link.implicit);
-        let rest = link.torque + force[0];
-        (link.column, link.inverse, link.rest) = (c, inverse, rest);
+        let inverse = f64x2::ONE / (c[0] + rung.implicit);
+        let rest = rung.torque + force[0];
+        (rung.column, rung.inverse, rung.rest) = (c, inverse, rest);
         // The products do not wait for the division.
         for k in 0..3 {
             force[k] -= c[k] * rest * inverse;
@@ -112,6 +158,23 @@ impl Articulated {
         inertia[5] -= c[2] * c[2] * inverse;
     }
 
+    /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
+    fn at_root(&self, root: &Rung) -> Articulated {
+        let lane = |value: f64x2, lane: usize| value.to_array()[lane];
+        let mut right = Self {
+            inertia: self.inertia.map(|value| f64x2::splat(lane(value, 1))),
+            force: self.force.map(|value| f64x2::splat(lane(value, 1))),
+        };
+        right.take(root);
+        let both = |left: f64x2, right: f64x2| lane(left, 0) + lane(right, 0);
+        Articulated {
+            inertia: std::array::from_fn(|k| both(self.inertia[k], right.inertia[k])),
+            force: std::array::from_fn(|k| both(self.force[k], right.force[k])),
+        }
+    }
+}
+
+impl Articulated {
     /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned.
     fn motion(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
@@ -128,54 +191,41 @@ impl Articulated {
     }
 }
 
-/// Motion of a link whose reference point moves with `base`.
-#[inline(always)]
-fn follow(link: &mut Link, base: Spatial) {
-    let [turn, x, z] = base;
-    let c = link.column;
-    let rate = link.inverse * (link.rest - (c[0] * turn + c[1] * x + c[2] * z));
-    link.mean = [turn + rate, x, z];
-}
-
-/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques.
-pub(super) fn solve(links: &mut [Link], root: usize, clamped: bool, corners: &[Corner], law: &Law) {
-    let of = |i: usize| corners.get(2 * i..2 * i + 2).unwrap_or_default();
-    let last = links.len() - 1;
-    let (left, rest) = links.split_at_mut(root);
-    let (base, right) = rest.split_first_mut().expect("the root is one of the links");
-    let (mut from_left, mut from_right) = (Articulated::default(), Articulated::default());
-    // Both arms in one loop: neither waits for the other.
-    for k in 0..left.len().max(right.len()) {
-        if let Some(link) = left.get_mut(k) {
-            from_left.take(link, of(k), law);
-            from_left.through_joint(link);
+/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. A chain without `floor` touches nothing.
+pub(super) fn solve(rungs: &mut [Rung], clamped: bool, floor: Option<(&Floor, &Law)>) {
+    let Some((root, arms)) = rungs.split_first_mut() else { return };
+    let mut chain = Arms::default();
+    for (k, rung) in arms.iter_mut().enumerate().rev() {
+        chain.take(rung);
+        if let Some((floor, law)) = floor
+            && floor.touches(k + 1)
+        {
+            chain.touch(floor.of_rung(k + 1, law));
         }
-        if let Some(link) = right.len().checked_sub(k + 1).and_then(|i| right.get_mut(i)) {
-            from_right.take(link, of(last - k), law);
-            from_right.through_joint(link);
-        }
+        chain.through_joints(rung);
     }
-    base.mean = if clamped {
+    let motion = if clamped {
         [0.0; 3]
     } else {
-        from_right.take(base, of(root), law);
-        for k in 0..6 {
-            from_right.inertia[k] += from_left.inertia[k];
+        let mut whole = chain.at_root(root);
+        if let Some((floor, law)) = floor
+            && floor.touches(0)
+        {
+            let [by, _] = floor.of_rung(0, law);
+            (0..6).for_each(|k| whole.inertia[k] += by.inertia[k]);
+            (0..3).for_each(|k| whole.force[k] += by.force[k]);
         }
-        for k in 0..3 {
-            from_right.force[k] += from_left.force[k];
-        }
-        from_right.motion()
+        whole.motion()
     };
-    let (mut to_left, mut to_right) = (base.mean, base.mean_of_end());
-    for k in 0..left.len().max(right.len()) {
-        if let Some(link) = left.len().checked_sub(k + 1).and_then(|i| left.get_mut(i)) {
-            follow(link, to_left);
-            to_left = link.mean_of_end();
-        }
-        if let Some(link) = right.get_mut(k) {
-            follow(link, to_right);
-            to_right = link.mean_of_end();
-        }
+    root.mean = motion.map(f64x2::splat);
+    // Lane 0 starts at the root's reference point, lane 1 at its other end.
+    let end = root.mean_of_end();
+    let mut mean: Spatials = std::array::from_fn(|k| f64x2::new([motion[k], end[k].to_array()[0]]));
+    for rung in arms {
+        let [turn, x, z] = mean;
+        let c = rung.column;
+        let rate = rung.inverse * (rung.rest - (c[0] * turn + c[1] * x + c[2] * z));
+        rung.mean = [turn + rate, x, z];
+        mean = rung.mean_of_end();
     }
 }

@@ -5,9 +5,12 @@
 //! implicit terms and a frictionless floor. What is left out is small beside k, so the steps shrink by a constant factor. Without
 //! friction the equilibrium of a robot on the floor does not depend on how it got there; the centre of mass keeps its x.
 
+use wide::f64x2;
+
 use super::contact::{Grip, Law};
-use super::recursion::solve;
-use super::{Corner, EngineError, PlanarEngine};
+use super::floor::Floor;
+use super::recursion::{Rung, solve};
+use super::{Engine, EngineError, PlanarEngine, direction};
 use crate::model::Mount;
 
 /// Rigid motions that cost no energy are held by this share of the inertia (1/s²).
@@ -30,24 +33,26 @@ impl PlanarEngine {
         if self.mount == Mount::Free && self.gravity != 0.0 {
             return none("a free robot falls");
         }
-        let weight = (self.mass * self.gravity).max(f64::MIN_POSITIVE);
-        let law = Law::statics(weight / GIVE);
-        let dynamic: Vec<(f64, f64, f64)> = self.links.iter().map(|link| (link.mass, link.inertia, link.implicit)).collect();
-        for link in &mut self.links {
-            link.implicit = self.joint.stiffness;
-            link.mass *= HOLD;
-            link.inertia *= HOLD;
+        self.prepare(voltages)?;
+        let dynamic = self.rungs.clone();
+        let mut grips = vec![[Grip::new(0.0); 2]; dynamic.len()];
+        if let Some(floor) = &mut self.floor {
+            floor.swap_grips(&mut grips);
         }
-        self.motions.fill([0.0; 3]);
+        for rung in &mut self.rungs {
+            rung.implicit = rung.stiffness.fast_max(f64x2::ONE);
+            rung.mass *= f64x2::splat(HOLD);
+            rung.inertia *= f64x2::splat(HOLD);
+            rung.motion = Default::default();
+        }
         self.velocity = [0.0; 2];
-        let grips = std::mem::replace(&mut self.grips, vec![Grip::new(0.0); self.links.len()]);
-        let settled = self.settle_in_steps(voltages, &law, &dynamic);
-        for (link, (mass, inertia, implicit)) in self.links.iter_mut().zip(dynamic) {
-            (link.mass, link.inertia, link.implicit) = (mass, inertia, implicit);
+        let settled = self.settle_in_steps(&dynamic);
+        for (rung, real) in self.rungs.iter_mut().zip(&dynamic) {
+            (rung.mass, rung.inertia, rung.implicit) = (real.mass, real.inertia, real.implicit);
         }
-        self.grips = grips;
-        for corner in &mut self.corners {
-            *corner = Corner::default();
+        if let Some(floor) = &mut self.floor {
+            floor.swap_grips(&mut grips);
+            Floor::clear(floor);
         }
         match settled? {
             true => Ok(()),
@@ -55,46 +60,38 @@ impl PlanarEngine {
         }
     }
 
-    fn settle_in_steps(&mut self, voltages: &[f64], law: &Law, bodies: &[(f64, f64, f64)]) -> Result<bool, EngineError> {
-        let m = self.motors_per_actuator;
+    fn settle_in_steps(&mut self, bodies: &[Rung]) -> Result<bool, EngineError> {
+        let weight = (self.mass * self.gravity).max(f64::MIN_POSITIVE);
+        let law = Law::statics(weight / GIVE);
+        let pull = self.pull.map(f64x2::splat);
         for _ in 0..LARGEST_STEPS {
-            for (link, angle) in self.links.iter_mut().zip(&self.angles) {
-                link.along = [angle.cos(), angle.sin()];
+            for (rung, body) in self.rungs.iter_mut().zip(bodies) {
+                rung.posed = rung.angle;
+                rung.along = direction(rung.angle);
+                rung.across = rung.along.map(|along| rung.reach * along);
+                rung.load([f64x2::ZERO, body.mass * pull[0], body.mass * pull[1]]);
             }
-            self.posed.copy_from_slice(&self.angles);
-            for (link, body) in self.links.iter_mut().zip(bodies) {
-                link.momentum = [0.0, body.0 * self.pull[0], body.0 * self.pull[1]];
+            self.load_torques(1.0);
+            if !self.solve_on_floor(&law)? {
+                solve(&mut self.rungs, self.mount == Mount::Clamped, None);
             }
-            for i in 0..self.angles.len() - 1 {
-                let angle = self.angles[i] - self.angles[i + 1];
-                let torque = self.joint.torque(angle, 0.0, voltages[i / m] / m as f64);
-                if i < self.root {
-                    self.links[i].torque = torque;
-                } else {
-                    self.links[i + 1].torque = -torque;
-                }
-            }
-            if self.find_corners(law) {
-                self.solve_contact(law)?;
-            } else {
-                solve(&mut self.links, self.root, self.mount == Mount::Clamped, &[], law);
-            }
-            let largest = self.links.iter().map(|link| link.mean[0].abs()).fold(0.0, f64::max);
-            let share = (LARGEST_TURN / largest).min(1.0);
-            let mut rise = [0.0; 2];
-            for ((link, angle), body) in self.links.iter().zip(&mut self.angles).zip(bodies) {
-                let mean = link.mean_of_centre();
-                *angle += share * mean[0];
-                rise[0] += body.0 * mean[1];
-                rise[1] += body.0 * mean[2];
-            }
-            if self.mount != Mount::Clamped {
-                self.centre[1] += share * rise[1] / self.mass;
-            }
+            let turns = self.rungs.iter().flat_map(|rung| rung.mean[0].to_array());
+            let largest = turns.map(f64::abs).fold(0.0, f64::max);
             if !largest.is_finite() {
                 return Ok(false);
             }
-            if largest <= SETTLED && rise[1].abs() <= SETTLED * self.mass {
+            let share = (LARGEST_TURN / largest).min(1.0);
+            let mut rise = f64x2::ZERO;
+            for rung in &mut self.rungs {
+                let mean = rung.mean_of_centre();
+                rung.angle += f64x2::splat(share) * mean[0];
+                rise += rung.share * mean[2];
+            }
+            let rise = rise.reduce_add();
+            if self.mount != Mount::Clamped {
+                self.centre[1] += share * rise;
+            }
+            if largest <= SETTLED && rise.abs() <= SETTLED {
                 return Ok(true);
             }
         }

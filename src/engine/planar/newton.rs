@@ -1,0 +1,140 @@
+//! Newton's method over the states of the corners.
+
+use wide::f64x2;
+
+use super::contact::Law;
+use super::recursion::{Spatials, solve};
+use super::{EngineError, PlanarEngine};
+
+/// Newton steps after which a contact problem is given up.
+const LARGEST_ITERATIONS: u32 = 100;
+/// The search ends where the slope of the cost is this share of the one it began with.
+const SEARCH_ENOUGH: f64 = 0.1;
+/// Steps of the search along one Newton step; it ends much earlier.
+const LARGEST_SEARCH: u32 = 60;
+/// A Newton step is the last if the cost falls by less than these shares of m (g h)² and of the kinetic energy: the first is a velocity of
+/// 10⁻⁶ of what gravity gives in a step, the second what rounding leaves.
+const DONE_OF_GRAVITY: f64 = 1e-12;
+const DONE_OF_KINETIC: f64 = 1e-18;
+
+/// How a search along a Newton step ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Search {
+    /// The cost cannot fall any more.
+    Done,
+    /// The lowest cost is at the end of the step.
+    Whole,
+    /// It is on the way.
+    Part,
+}
+
+impl PlanarEngine {
+    /// Solves the step's mean motion with the floor; false, and nothing done, if no corner is near it.
+    ///
+    /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
+    /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is lowered along the way there.
+    pub(super) fn solve_on_floor(&mut self, law: &Law) -> Result<bool, EngineError> {
+        let height = match &self.floor {
+            Some(_) => self.root_position(0.5 * self.time_step)[1],
+            None => return Ok(false),
+        };
+        let near = self.floor.as_mut().is_some_and(|floor| floor.find(&self.rungs, height, law));
+        if !near {
+            return Ok(false);
+        }
+        let velocity = self.root_velocity();
+        let Some(floor) = &mut self.floor else { return Ok(false) };
+        floor.begin(&self.rungs, velocity, law);
+        for iteration in 1..=LARGEST_ITERATIONS {
+            self.iterations += 1;
+            let Some(floor) = &mut self.floor else { return Ok(false) };
+            solve(&mut self.rungs, false, Some((floor, law)));
+            let mut agrees = true;
+            floor.near(&self.rungs, |corner, mean| agrees &= corner.agrees(mean, law));
+            if agrees {
+                return Ok(true);
+            }
+            match if iteration == 1 { Search::Whole } else { self.search(law) } {
+                Search::Done => return Ok(true),
+                Search::Part => {}
+                Search::Whole => {
+                    // After the first solution: its states were a guess, and any motion will do for an iterate.
+                    let Some(floor) = &mut self.floor else { return Ok(false) };
+                    floor.near(&self.rungs, |corner, mean| corner.accept(mean, law));
+                    for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
+                        *iterate = rung.mean;
+                    }
+                }
+            }
+            if let Some(floor) = &mut self.floor {
+                floor.mark();
+            }
+        }
+        let time = self.step as f64 * self.time_step;
+        Err(EngineError::NotConverged { iterations: LARGEST_ITERATIONS, step: self.step, time })
+    }
+
+    /// Lowers the cost between the iterate and the rungs' mean motion, and moves the iterate there.
+    ///
+    /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
+    fn search(&mut self, law: &Law) -> Search {
+        let Some(floor) = &mut self.floor else { return Search::Done };
+        let (mut metric, mut kinetic) = (f64x2::ZERO, f64x2::ZERO);
+        let mut inner = f64x2::ZERO;
+        for (k, (rung, iterate)) in self.rungs.iter().zip(&self.iterate).enumerate() {
+            let way: Spatials = std::array::from_fn(|i| rung.mean[i] - iterate[i]);
+            let [turn, x, z] = rung.of_centre(way);
+            metric += rung.mass * (x * x + z * z) + rung.inertia * turn * turn;
+            if k > 0 {
+                let rate = turn - inner;
+                // Lanes without mass follow their inner neighbours: their joints do not turn.
+                metric += rung.implicit * rate * rate;
+            }
+            inner = if k > 0 { turn } else { f64x2::splat(turn.to_array()[0]) };
+            let [turn, x, z] = rung.mean_of_centre();
+            kinetic += rung.mass * (x * x + z * z) + rung.inertia * turn * turn;
+        }
+        let (metric, kinetic) = (metric.reduce_add(), kinetic.reduce_add());
+        let mut end = 0.0;
+        floor.near(&self.rungs, |corner, mean| end += corner.aim(mean, law));
+        let slope_at = |t: f64| {
+            let (along, slope) = floor.sum(|corner| corner.search(t, law));
+            (end - (1.0 - t) * metric - along, metric - slope)
+        };
+        let start = -slope_at(0.0).0;
+        let weight = self.gravity * self.time_step;
+        if start <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic {
+            return Search::Done;
+        }
+        let (mut low, mut high, mut t) = (0.0, 1.0, 1.0);
+        let mut found = 1.0;
+        for _ in 0..LARGEST_SEARCH {
+            let (first, second) = slope_at(t);
+            found = t;
+            if first.abs() <= SEARCH_ENOUGH * start || (t == 1.0 && first < 0.0) {
+                break;
+            }
+            if first > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            let next = t - first / second;
+            t = if next > low && next < high { next } else { 0.5 * (low + high) };
+            if t == found || high - low <= f64::EPSILON * high {
+                break;
+            }
+        }
+        if found == 1.0 {
+            return Search::Whole;
+        }
+        let share = f64x2::splat(found);
+        for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
+            for (from, to) in iterate.iter_mut().zip(&rung.mean) {
+                *from += share * (*to - *from);
+            }
+        }
+        floor.near(&self.rungs, |corner, _| corner.go(found, law));
+        Search::Part
+    }
+}
