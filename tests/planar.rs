@@ -85,7 +85,7 @@ fn elliptic_k(k: f64) -> f64 {
 fn a_pendulum_swings_with_the_period_of_its_amplitude() {
     let text = "[material]\npiezo_modulus_gpa = 1e-30\nsubstrate_modulus_gpa = 1e-30\nadhesive_modulus_gpa = 1e-30\n[robot]\nactuators = 1\nmotors_per_actuator = 1\nmount = \"clamped\"\ndamping_eta = 0\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0]\n[simulation]\ntime_step_s = 1e-4\nsteps = 1\n";
     let experiment = experiment_of(text, &[]);
-    let body = experiment.robot.segments()[1].clone();
+    let body = experiment.robot.segments()[1];
     let thickness = experiment.robot.collision_thickness;
     let arm = body.length / 2.0;
     // Per mass: I/m = (l² + t²)/12 + (l/2)².

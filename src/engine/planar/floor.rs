@@ -57,7 +57,7 @@ impl Floor {
                     let far = if end == 0 { [f64x2::ZERO; 2] } else { rung.across };
                     let (x, z) = ((far[0] + side).to_array(), (far[1] + drop).to_array());
                     for (lane, gap) in gaps.to_array().into_iter().enumerate() {
-                        if gap < reach && rung.mass.to_array()[lane] > 0.0 {
+                        if gap < reach && rung.mass.as_array()[lane] > 0.0 {
                             let slot = 2 * end + lane;
                             self.corners[k][slot].place([x[lane], z[lane]], gap, self.grips[k][lane], law);
                             self.is_near[k][slot] = true;
@@ -117,7 +117,7 @@ impl Floor {
     /// Calls `each` with every near corner and the mean motion of its body.
     pub(super) fn near(&mut self, rungs: &[Rung], mut each: impl FnMut(&mut Corner, &Spatial)) {
         for &(rung, slot) in &self.near {
-            let mean = rungs[rung].mean.map(|part| part.to_array()[slot % 2]);
+            let mean = rungs[rung].mean.map(|part| part.as_array()[slot % 2]);
             each(&mut self.corners[rung][slot], &mean);
         }
     }

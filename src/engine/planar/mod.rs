@@ -184,7 +184,7 @@ impl PlanarEngine {
     /// One number of body `i`.
     fn of_body(&self, i: usize, what: impl Fn(&Rung) -> f64x2) -> f64 {
         let (rung, lane) = place(i, self.root);
-        what(&self.rungs[rung]).to_array()[lane]
+        what(&self.rungs[rung]).as_array()[lane]
     }
 
     /// Turns the links to where they are in the middle of the step if all goes on at its rates.
@@ -337,12 +337,12 @@ impl Engine for PlanarEngine {
             inner = [rung.angle, rung.motion[0]];
             check += f64x2::ZERO * (angle + rate);
             let torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
-            for (joint, lane, sign) in [(left, 0, 1.0), (Some(right), 1, -1.0)] {
-                if let Some(i) = joint.filter(|i| *i < state.angles.len()) {
-                    state.angles[i] = sign * angle.to_array()[lane];
-                    state.rates[i] = sign * rate.to_array()[lane];
-                    state.torques[i] = -sign * torque.to_array()[lane];
-                }
+            let [angle, rate, torque] = [angle, rate, torque].map(f64x2::to_array);
+            if let Some(i) = left {
+                (state.angles[i], state.rates[i], state.torques[i]) = (angle[0], rate[0], -torque[0]);
+            }
+            if right < state.angles.len() {
+                (state.angles[right], state.rates[right], state.torques[right]) = (-angle[1], -rate[1], torque[1]);
             }
         }
         let mut sum = check.reduce_add();

@@ -160,7 +160,7 @@ impl Arms {
 
     /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
     fn at_root(&self, root: &Rung) -> Articulated {
-        let lane = |value: f64x2, lane: usize| value.to_array()[lane];
+        let lane = |value: f64x2, lane: usize| value.as_array()[lane];
         let mut right = Self {
             inertia: self.inertia.map(|value| f64x2::splat(lane(value, 1))),
             force: self.force.map(|value| f64x2::splat(lane(value, 1))),
