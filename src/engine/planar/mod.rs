@@ -158,7 +158,7 @@ impl PlanarEngine {
             floor: (robot.mount == Mount::Ground).then(|| Floor::new(&frictions, 0.5 * thickness)),
             iterate: vec![Spatials::default(); rungs.len()],
             rungs,
-            law: Law::new(time_step, weight, mass),
+            law: Law::new(time_step, weight, mass / count as f64),
             weight,
             step: 0,
             state: JointState { angles: joints(), rates: joints(), torques: joints(), motor_voltages: joints() },

@@ -6,14 +6,16 @@ use super::contact::Law;
 use super::recursion::{Spatials, solve};
 use super::{EngineError, PlanarEngine};
 
-/// Newton steps after which a contact problem is given up.
+/// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured: 41 in the paper's robots; when a
+/// whole chain of 961 bodies is set in motion at once, 799.
 const LARGEST_ITERATIONS: u32 = 100;
+const MORE_PER_BODY: u32 = 4;
 /// The search ends where the slope of the cost is this share of the one it began with.
 const SEARCH_ENOUGH: f64 = 0.1;
 /// Steps of the search along one Newton step; it ends much earlier.
 const LARGEST_SEARCH: u32 = 60;
-/// A Newton step is the last if the cost falls by less than these shares of m (g h)² and of the kinetic energy: the first is a velocity of
-/// 10⁻⁶ of what gravity gives in a step, the second what rounding leaves.
+/// A Newton step is the last if the cost falls by less than these shares of m (g h)² and, per body, of the kinetic energy: the first is a
+/// velocity of 10⁻⁶ of what gravity gives in a step, the second what rounding leaves (measured: 3·10⁻²⁰ for 16 bodies and for 961).
 const DONE_OF_GRAVITY: f64 = 1e-12;
 const DONE_OF_KINETIC: f64 = 1e-18;
 
@@ -45,7 +47,8 @@ impl PlanarEngine {
         let velocity = self.root_velocity();
         let Some(floor) = &mut self.floor else { return Ok(false) };
         floor.begin(&self.rungs, velocity, law);
-        for iteration in 1..=LARGEST_ITERATIONS {
+        let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
+        for iteration in 1..=largest {
             self.iterations += 1;
             let Some(floor) = &mut self.floor else { return Ok(false) };
             solve(&mut self.rungs, false, Some((floor, law)));
@@ -71,7 +74,7 @@ impl PlanarEngine {
             }
         }
         let time = self.step as f64 * self.time_step;
-        Err(EngineError::NotConverged { iterations: LARGEST_ITERATIONS, step: self.step, time })
+        Err(EngineError::NotConverged { iterations: largest, step: self.step, time })
     }
 
     /// Lowers the cost between the iterate and the rungs' mean motion, and moves the iterate there.
@@ -103,7 +106,7 @@ impl PlanarEngine {
         };
         let start = -slope_at(0.0).0;
         let weight = self.gravity * self.time_step;
-        if start <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic {
+        if start <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic * self.count as f64 {
             return Search::Done;
         }
         let (mut low, mut high, mut t) = (0.0, 1.0, 1.0);
