@@ -15,13 +15,13 @@ fn steps_allocate_nothing() {
             let experiment = experiment::experiment(&source).unwrap();
             let mut robot = experiment.engine().unwrap();
             let mut voltages = vec![0.0; experiment.robot.actuators];
-            let mut scratch = voltages.clone();
+            let mut start = voltages.clone();
             let nodes = 3 * (experiment.robot.joints() + 2);
             let (mut positions, mut velocities) = (vec![0.0; nodes], vec![0.0; nodes]);
             let mut steps = |count: u64| {
                 for _ in 0..count {
                     let time = robot.step() as f64 * experiment.time_step;
-                    experiment.drive.mean(time, time + experiment.time_step, &mut voltages, &mut scratch);
+                    experiment.drive.mean(time, time + experiment.time_step, &mut start, &mut voltages);
                     robot.prepare(&voltages).unwrap();
                     robot.nodes(&mut positions, &mut velocities).unwrap();
                     robot.advance().unwrap();

@@ -104,33 +104,30 @@ impl Drive {
         !matches!(self.waveform, Waveform::Sine { .. } | Waveform::Table(_))
     }
 
-    /// Mean voltages (V) from `from` to `to` (s) into `out`, with `scratch` of the same length: a jump within counts from its moment on,
-    /// what changes smoothly is taken at the middle.
-    pub fn mean(&self, from: f64, to: f64, out: &mut [f64], scratch: &mut [f64]) {
+    /// Mean voltages (V) from `from` to `to` (s) into `out`: a jump within counts from its moment on, what changes smoothly is taken at the
+    /// middle. `start` holds the voltages at `from` and takes those at `to`, for the next stretch.
+    pub fn mean(&self, from: f64, to: f64, start: &mut [f64], out: &mut [f64]) {
         if !self.jumps() {
             return self.voltages(0.5 * (from + to), out);
         }
-        self.voltages(from, out);
-        self.voltages(to, scratch);
-        if out == scratch {
-            return;
-        }
+        self.voltages(to, out);
+        let Some(first) = out.iter().zip(&*start).position(|(end, start)| end != start) else { return };
         // The jump lies between `before` and `after`.
         let (mut before, mut after) = (from, to);
-        let first = out[..].iter().zip(&*scratch).position(|(a, b)| a != b).unwrap_or(0);
-        let value = out[first];
         loop {
             let middle = 0.5 * (before + after);
             if middle <= before || middle >= after {
                 break;
             }
-            self.voltages(middle, scratch);
-            if scratch[first] == value { before = middle } else { after = middle }
+            self.voltages(middle, out);
+            if out[first] == start[first] { before = middle } else { after = middle }
         }
-        self.voltages(to, scratch);
+        self.voltages(to, out);
         let share = (after - from) / (to - from);
-        for (out, end) in out.iter_mut().zip(&*scratch) {
-            *out = share * *out + (1.0 - share) * end;
+        for (out, start) in out.iter_mut().zip(start) {
+            let end = *out;
+            *out = share * *start + (1.0 - share) * end;
+            *start = end;
         }
     }
 
@@ -148,6 +145,22 @@ impl Drive {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_mean_over_a_step_counts_a_jump_from_its_moment_on() {
+        let drive = Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0 };
+        let (mut start, mut mean) = (vec![0.0; 2], vec![f64::NAN; 2]);
+        drive.mean(0.0, 0.1, &mut start, &mut mean);
+        assert_eq!(mean, [0.0, 0.0]);
+        drive.mean(0.1, 0.5, &mut start, &mut mean);
+        assert!((mean[0] + 500.0).abs() < 1e-9 && (mean[1] - 300.0).abs() < 1e-9, "{mean:?}");
+        assert_eq!(start, [-1000.0, 600.0]);
+        drive.mean(0.5, 0.6, &mut start, &mut mean);
+        assert_eq!(mean, start);
+        let sine = Drive { waveform: Waveform::Sine { amplitudes: vec![-2.0], frequency: 1.0 }, positive_gain: 1.0 };
+        sine.mean(0.2, 0.3, &mut [0.0], &mut mean[..1]);
+        assert!((mean[0] + 1.0).abs() < 1e-12);
+    }
 
     fn at(waveform: Waveform, gain: f64, t: f64) -> Vec<f64> {
         let mut out = vec![f64::NAN; 2];

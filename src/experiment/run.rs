@@ -71,11 +71,13 @@ pub fn run(
     let mut recorder = Recorder::new(experiment);
     let mut books = Books::new(&experiment.robot, experiment.time_step);
     let mut voltages = vec![0.0; experiment.robot.actuators];
-    let mut scratch = voltages.clone();
     let midpoint = engine.midpoint();
     let mut interrupted = false;
     let mut done = engine.step();
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
+    // Voltages at the beginning of the coming step.
+    let mut start = voltages.clone();
+    experiment.drive.voltages(done as f64 * experiment.time_step, &mut start);
     while done < experiment.steps {
         if done.is_multiple_of(OBSERVE_EVERY) && observe(done) == Control::Stop {
             interrupted = true;
@@ -85,7 +87,7 @@ pub fn run(
         time = done as f64 * experiment.time_step;
         if midpoint {
             let end = (done + 1) as f64 * experiment.time_step;
-            experiment.drive.mean(time, end, &mut voltages, &mut scratch);
+            experiment.drive.mean(time, end, &mut start, &mut voltages);
         } else {
             experiment.drive.voltages(before, &mut voltages);
         }

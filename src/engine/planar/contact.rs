@@ -11,8 +11,8 @@ use super::recursion::{Articulated, Spatial};
 /// Softness of contact as a share of a body's inverse mass: under half its weight a corner gives way by 3·10⁻⁸ cm/s at steps of 10⁻⁴ s.
 /// Ten times stiffer contact changes heights and strides by 10⁻⁴ of them and takes a tenth more iterations.
 const SOFTNESS: f64 = 6e-7;
-/// Speed (cm/s) at which something could come down from the height that is looked at.
-const FASTEST: f64 = 400.0;
+/// Largest change of a corner's vertical velocity in a step (cm/s) that is looked ahead for: more than the robots fall with.
+const LARGEST_CHANGE: f64 = 150.0;
 /// Share of a penetration that is pushed out per step, and the largest speed of it (cm/s): so slow that it makes no energy to speak of.
 const PUSH_OUT: f64 = 0.1;
 const PUSH_OUT_SPEED: f64 = 0.01;
@@ -29,9 +29,9 @@ pub(super) struct Law {
 }
 
 impl Law {
-    /// Height (cm) below which a corner may touch during a step.
-    pub(super) fn reach(&self) -> f64 {
-        FASTEST * self.time_step
+    /// Step (s), and the gap (cm) that a corner at rest may close in it.
+    pub(super) fn reach(&self) -> (f64, f64) {
+        (self.time_step, LARGEST_CHANGE * self.time_step)
     }
 
     pub(super) fn new(time_step: f64, weight: f64, body_mass: f64) -> Self {
@@ -91,15 +91,14 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    /// A corner at `arm` from its body's reference point, `gap` (cm) above the floor.
-    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, grip: Grip, law: &Law) {
+    /// A corner at `arm` from its body's reference point, `gap` (cm) above the floor, that moves with `before` (cm/s): what mean velocity
+    /// stops it on the floor at the step's end.
+    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, before: [f64; 2], grip: Grip, law: &Law) {
         self.arm = arm;
         self.grip = grip;
-        self.target[1] = if gap > 0.0 || law.frictionless {
-            -gap / law.time_step
-        } else {
-            (-PUSH_OUT * gap / law.time_step).min(PUSH_OUT_SPEED)
-        };
+        let ahead = -gap / law.time_step;
+        let end = if gap > 0.0 || law.frictionless { ahead } else { (PUSH_OUT * ahead).min(PUSH_OUT_SPEED) };
+        self.target = [before[0] * (1.0 - law.weight), before[1] + law.weight * (end - before[1])];
     }
 
     /// A corner that nothing touches.
@@ -110,12 +109,6 @@ impl Corner {
 
     pub(super) fn is_open(&self) -> bool {
         self.touch == Touch::Open
-    }
-
-    /// Turns the target for the end of the step into one for the mean, from the velocity `before` (cm/s) the step.
-    pub(super) fn begin(&mut self, before: [f64; 2], law: &Law) {
-        let ahead = self.target[1];
-        self.target = [before[0] * (1.0 - law.weight), before[1] + law.weight * (ahead - before[1])];
     }
 
     /// Impulse of the floor on it over the step (dyn·s).

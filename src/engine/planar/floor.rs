@@ -34,63 +34,54 @@ impl Floor {
         }
     }
 
-    /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on;
-    /// whether any does. Lanes without mass have no corners.
-    pub(super) fn find(&mut self, rungs: &[Rung], height: f64, law: &Law) -> bool {
+    /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
+    /// moving with `velocity` (cm/s); whether any does. Lanes without mass have no corners.
+    pub(super) fn find(&mut self, rungs: &[Rung], height: f64, velocity: [f64; 2], law: &Law) -> bool {
         std::mem::swap(&mut self.near, &mut self.near_before);
         self.near.clear();
         for &(rung, slot) in &self.near_before {
             self.is_near[rung][slot] = false;
         }
-        let reach = law.reach();
+        let (step, reach) = law.reach();
+        let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
+        let mut moving = velocity.map(f64x2::splat);
         for (k, rung) in rungs.iter().enumerate() {
+            let rate = rung.motion[0];
             // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
             let down = half.copysign(rung.along[0]);
-            let drop = -down * rung.along[0];
-            let first = at + drop;
-            let ends = [first, first + rung.across[1]];
-            if ends[0].fast_min(ends[1]).to_array().iter().any(|gap| *gap < reach) {
-                let side = down * rung.along[1];
-                for (end, gaps) in ends.iter().enumerate() {
-                    let far = if end == 0 { [f64x2::ZERO; 2] } else { rung.across };
-                    let (x, z) = ((far[0] + side).to_array(), (far[1] + drop).to_array());
-                    for (lane, gap) in gaps.to_array().into_iter().enumerate() {
-                        if gap < reach && rung.mass.as_array()[lane] > 0.0 {
-                            let slot = 2 * end + lane;
-                            self.corners[k][slot].place([x[lane], z[lane]], gap, self.grips[k][lane], law);
-                            self.is_near[k][slot] = true;
-                            self.near.push((k, slot));
-                        }
+            let offset = [down * rung.along[1], -down * rung.along[0]];
+            for end in 0..2 {
+                let arm = if end == 0 { offset } else { [rung.across[0] + offset[0], rung.across[1] + offset[1]] };
+                let gap = at + arm[1];
+                let vertical = moving[1] + rate * arm[0];
+                let near = gap.simd_lt(reach - step * vertical);
+                if near.none() {
+                    continue;
+                }
+                let before = [(moving[0] - rate * arm[1]).to_array(), vertical.to_array()];
+                let (near, gap, [x, z]) = (near.to_bitmask(), gap.to_array(), arm.map(|part| part.to_array()));
+                for lane in 0..2 {
+                    if near & (1 << lane) != 0 && rung.mass.as_array()[lane] > 0.0 {
+                        let slot = 2 * end + lane;
+                        let before = [before[0][lane], before[1][lane]];
+                        self.corners[k][slot].place([x[lane], z[lane]], gap[lane], before, self.grips[k][lane], law);
+                        self.is_near[k][slot] = true;
+                        self.near.push((k, slot));
                     }
                 }
             }
             at = next(at, rung.across[1], k);
+            moving = [next(moving[0], -rate * rung.across[1], k), next(moving[1], rate * rung.across[0], k)];
         }
         for &(rung, slot) in &self.near_before {
             if !self.is_near[rung][slot] {
                 self.corners[rung][slot].open();
             }
         }
-        !self.near.is_empty()
-    }
-
-    /// Gives the near corners their velocities before the step, with the root's reference point at `velocity` (cm/s).
-    pub(super) fn begin(&mut self, rungs: &[Rung], velocity: [f64; 2], law: &Law) {
-        let mut near = self.near.iter().peekable();
-        let mut at = velocity.map(f64x2::splat);
-        for (k, rung) in rungs.iter().enumerate() {
-            let rate = rung.motion[0].to_array();
-            let [x, z] = at.map(|v| v.to_array());
-            while let Some(&(_, slot)) = near.next_if(|entry| entry.0 == k) {
-                let corner = &mut self.corners[k][slot];
-                let lane = slot % 2;
-                corner.begin([x[lane] - rate[lane] * corner.arm[1], z[lane] + rate[lane] * corner.arm[0]], law);
-            }
-            at = [next(at[0], -rung.motion[0] * rung.across[1], k), next(at[1], rung.motion[0] * rung.across[0], k)];
-        }
         self.mark();
+        !self.near.is_empty()
     }
 
     /// Notes which rungs have corners that are not open.

@@ -36,17 +36,13 @@ impl PlanarEngine {
     /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
     /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is lowered along the way there.
     pub(super) fn solve_on_floor(&mut self, law: &Law) -> Result<bool, EngineError> {
-        let height = match &self.floor {
-            Some(_) => self.root_position(0.5 * self.time_step)[1],
-            None => return Ok(false),
-        };
-        let near = self.floor.as_mut().is_some_and(|floor| floor.find(&self.rungs, height, law));
-        if !near {
+        if self.floor.is_none() {
             return Ok(false);
         }
-        let velocity = self.root_velocity();
-        let Some(floor) = &mut self.floor else { return Ok(false) };
-        floor.begin(&self.rungs, velocity, law);
+        let (height, velocity) = (self.root_position(0.5 * self.time_step)[1], self.root_velocity());
+        if !self.floor.as_mut().is_some_and(|floor| floor.find(&self.rungs, height, velocity, law)) {
+            return Ok(false);
+        }
         let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
         for iteration in 1..=largest {
             self.iterations += 1;
