@@ -538,3 +538,54 @@ fn bits_do_not_depend_on_threads_or_on_where_a_run_was_cut() {
     assert_eq!(&whole.positions[from * 3 * whole.nodes()..], &rest.positions[..]);
     assert!(second.load(0, &state[1..]).is_err());
 }
+
+/// One corner of a tilted chain hits the floor: the plastic impact of the textbook, u⁺ = u − M⁻¹Jᵀ (J M⁻¹ Jᵀ)⁻¹ J u, without friction.
+#[test]
+fn one_impact_is_that_of_the_textbook() {
+    let experiment = passive("actuators = 1\nmotors_per_actuator = 1\ndamping_eta = 0\nfriction = { ground = 0.0, film = \"none\" }");
+    let (tilt, speed, half): (f64, f64, f64) = (0.1, -50.0, 0.05);
+    let segments = experiment.robot.segments();
+    // Coordinates: left end x and z, angles of both bodies. Jacobians of the centres of mass.
+    let (along, across) = ([tilt.cos(), tilt.sin()], [-tilt.sin(), tilt.cos()]);
+    let mut mass = DMatrix::<f64>::zeros(4, 4);
+    for (b, segment) in segments.iter().enumerate() {
+        let mut jacobian = DMatrix::<f64>::zeros(3, 4);
+        for k in 0..2 {
+            jacobian[(k, k)] = 1.0;
+            for (i, before) in segments.iter().enumerate().take(b + 1) {
+                jacobian[(k, 2 + i)] = across[k] * before.length * if i == b { 0.5 } else { 1.0 };
+            }
+        }
+        jacobian[(2, 2 + b)] = 1.0;
+        let inertia = segment.mass / 12.0 * (segment.length.powi(2) + experiment.robot.collision_thickness.powi(2));
+        let own = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![segment.mass, segment.mass, inertia]));
+        mass += jacobian.transpose() * own * jacobian;
+    }
+    let corner = DMatrix::from_row_slice(1, 4, &[0.0, 1.0, half * tilt.sin(), 0.0]);
+    let before = DMatrix::from_column_slice(4, 1, &[0.0, speed, 0.0, 0.0]);
+    let inverse = mass.try_inverse().unwrap();
+    let push = &inverse * corner.transpose();
+    let after = &before - &push * ((&corner * &before)[(0, 0)] / (&corner * &push)[(0, 0)]);
+
+    let h = 1e-6;
+    let mut engine = engine(&experiment, h);
+    let mut state = State::of(&engine, 2);
+    state.angles().fill(tilt);
+    // The left end's lower corner a step and a half above the floor.
+    let total: f64 = segments.iter().map(|s| s.mass).sum();
+    let first: f64 = segments[0].mass / total;
+    let middle = first * 0.5 * segments[0].length + (1.0 - first) * (segments[0].length + 0.5 * segments[1].length);
+    state.centre()[1] = middle * along[1] + half * along[0] - half - 1.5 * h * speed;
+    state.centre()[3] = speed;
+    (0..2).for_each(|body| state.motion(body)[2] = speed);
+    state.load(&mut engine);
+    for _ in 0..4 {
+        step(&mut engine);
+    }
+    let mut state = State::of(&engine, 2);
+    for body in 0..2 {
+        let (found, exact) = (state.motion(body)[0], after[(2 + body, 0)]);
+        // Four steps of gravity and springs on top: seen 4e-5.
+        assert!((found / exact - 1.0).abs() < 1e-4, "body {body}: {found} {exact} rad/s");
+    }
+}
