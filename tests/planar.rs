@@ -542,7 +542,8 @@ fn bits_do_not_depend_on_threads_or_on_where_a_run_was_cut() {
 /// One corner of a tilted chain hits the floor: the plastic impact of the textbook, u⁺ = u − M⁻¹Jᵀ (J M⁻¹ Jᵀ)⁻¹ J u, without friction.
 #[test]
 fn one_impact_is_that_of_the_textbook() {
-    let experiment = passive("actuators = 1\nmotors_per_actuator = 1\ndamping_eta = 0\nfriction = { ground = 0.0, film = \"none\" }");
+    let experiment =
+        passive("actuators = 1\nmotors_per_actuator = 1\ndamping_eta = 0\nfriction = { ground = 0.0, film = \"none\" }");
     let (tilt, speed, half): (f64, f64, f64) = (0.1, -50.0, 0.05);
     let segments = experiment.robot.segments();
     // Coordinates: left end x and z, angles of both bodies. Jacobians of the centres of mass.
