@@ -60,8 +60,7 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
         if name == "set 2" {
             let mut three = sweep.clone();
             three.axes[axis - 1].values.retain(|m| m.as_integer() == Some(3));
-            let bullet = bench.spots(&id, &three, 5e-6, &SPOTS_HZ)?;
-            spots.extend(SPOTS_HZ.into_iter().zip(bullet.iter().map(|point| point.measures[0].unwrap_or(f64::NAN))));
+            spots = bench.spots(&id, &three, 5e-6, &SPOTS_HZ)?;
         }
         let chains: Vec<_> = sweep.axes[axis - 1].values.iter().filter_map(toml::Value::as_integer).collect();
         for (block, m) in points.chunks(sweep.axes[axis].values.len()).zip(chains) {

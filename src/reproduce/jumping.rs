@@ -172,12 +172,7 @@ pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
         "",
     );
     findings.without_result(&heights);
-    let bullet: Vec<(f64, f64)> = bench
-        .spots("jump-frequency", &sweep, 1e-5, &SPOTS_HZ)?
-        .iter()
-        .zip(SPOTS_HZ)
-        .map(|(point, f)| (f, point.measures[0].unwrap_or(f64::NAN)))
-        .collect();
+    let bullet = bench.spots("jump-frequency", &sweep, 1e-5, &SPOTS_HZ)?;
     for &(f, height) in &bullet {
         let planar = heights.iter().find(|p| p.0 == f).map_or(f64::NAN, |p| p.1);
         findings.check_on_bullet(&format!("height at {f} Hz"), "mm", planar, height);
@@ -202,9 +197,7 @@ pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
         .filter_map(|(t, z)| Some((t.parse().ok()?, z.parse().ok()?)))
         .collect();
     let times: Vec<f64> = theirs.iter().map(|p| p.0).collect();
-    let spots = bench.spots("jump-on-time", &sweep, ON_TIME_STEP, &times)?;
-    let bullet: Vec<(f64, f64)> =
-        spots.iter().zip(&times).map(|(point, &t)| (t, point.measures[0].unwrap_or(f64::NAN))).collect();
+    let bullet = bench.spots("jump-on-time", &sweep, ON_TIME_STEP, &times)?;
     let beside = |curve: &[(f64, f64)]| -> Vec<(f64, f64, f64)> {
         theirs.iter().filter_map(|&(t, z)| curve.iter().find(|p| (p.0 - t).abs() < 1e-9).map(|p| (t, z, p.1))).collect()
     };

@@ -197,7 +197,7 @@ pub const STUDIES: [Study; 10] = [
         cost_s: [15.0, 35.0],
         run: jumping::over_on_time,
     },
-    Study { id: "speed", title: "Speed against frequency", section: "IV", cost_s: [50.0, 54.0], run: walking::speed },
+    Study { id: "speed", title: "Speed against frequency", section: "IV", cost_s: [60.0, 120.0], run: walking::speed },
 ];
 
 /// Where studies are done: threads, folder, effort.
@@ -259,8 +259,8 @@ impl Bench<'_> {
         self.compute(id, sweep)
     }
 
-    /// Some points of a planar sweep on Bullet, by `step` (s): those whose last axis has one of `values`.
-    fn spots(&self, id: &str, sweep: &Sweep, step: f64, values: &[f64]) -> Result<Vec<Point>, StudyError> {
+    /// Some points of a planar sweep on Bullet, by `step` (s): the first measure against those `values` of the last axis.
+    fn spots(&self, id: &str, sweep: &Sweep, step: f64, values: &[f64]) -> Result<Vec<(f64, f64)>, StudyError> {
         let mut sweep = sweep.clone();
         sweep.source.set("simulation.engine=bullet")?;
         for axis in &mut sweep.axes {
@@ -271,7 +271,9 @@ impl Bench<'_> {
         if let Some(axis) = sweep.axes.last_mut() {
             axis.values = values.iter().map(|value| (*value).into()).collect();
         }
-        Ok(self.compute(&format!("{id}-bullet"), sweep)?.1)
+        let last = sweep.axes.len() - 1;
+        let (sweep, points) = self.compute(&format!("{id}-bullet"), sweep)?;
+        Ok(curve(&sweep, &points, last, 0))
     }
 
     fn compute(&self, id: &str, sweep: Sweep) -> Result<(Sweep, Vec<Point>), StudyError> {

@@ -102,12 +102,7 @@ pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
         );
     }
     findings.without_result(&speeds);
-    let bullet: Vec<(f64, f64)> = bench
-        .spots("speed", &sweep, 1e-5, &SPOTS_HZ)?
-        .iter()
-        .zip(SPOTS_HZ)
-        .map(|(point, f)| (f, point.measures[0].unwrap_or(f64::NAN)))
-        .collect();
+    let bullet = bench.spots("speed", &sweep, 1e-5, &SPOTS_HZ)?;
     for &(f, speed) in &bullet {
         findings.check_on_bullet(&format!("speed at {f} Hz"), "mm/s", at(f), speed);
     }
