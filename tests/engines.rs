@@ -122,6 +122,28 @@ fn jumps_and_strides_are_bullets() {
     }
 }
 
+/// With Coulomb's law steps of 10⁻⁴ s do for a gait on films of friction 4, where the convex model needs 10⁻⁶ s.
+#[test]
+fn coulomb_friction_walks_as_bullet_does_at_long_steps() {
+    let speed = |engine: &[&str]| {
+        let settings = [
+            "drive.on_voltages_v=[300,300,-1500,300,300]",
+            "robot.positive_gain=1.733",
+            "robot.friction.low=0.2",
+            "simulation.duration_s=3",
+            "simulation.record_every_s=0.01",
+        ];
+        measures(&preset("full-frictional-inchworm", &[&settings, engine].concat())).speed_mm_s.unwrap()
+    };
+    let bullet = speed(&["simulation.time_step_s=1e-5"]);
+    let planar = ["simulation.engine=planar", "simulation.time_step_s=1e-4"];
+    let coulomb = speed(&[&planar[..], &["simulation.friction=coulomb"]].concat());
+    let convex = speed(&planar);
+    // Seen: 24.2, 24.0 and 19.9 mm/s.
+    assert!((coulomb / bullet - 1.0).abs() < 0.03, "{coulomb} {bullet}");
+    assert!((convex / bullet - 1.0).abs() > 0.1, "{convex} {bullet}");
+}
+
 /// The height of a jump for how long the middle actuators are on, at the times of the authors' records (every 12,500 of their steps).
 #[test]
 fn the_authors_curve_is_met() {

@@ -10,7 +10,7 @@ mod planar;
 
 pub use bullet::BulletEngine;
 pub use energy::{Books, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
-pub use planar::PlanarEngine;
+pub use planar::{FrictionModel, PlanarEngine};
 
 use thiserror::Error;
 

@@ -160,6 +160,7 @@ pub struct PhaseConfig {
 pub struct SimulationConfig {
     pub engine: Option<String>,
     pub start: Option<String>,
+    pub friction: Option<String>,
     pub time_step_s: Option<StepConfig>,
     pub step_error: Option<f64>,
     pub step_measure: Option<String>,

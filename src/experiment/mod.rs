@@ -19,7 +19,7 @@ pub use run::{Control, Run, run};
 pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};
-use crate::engine::{BulletEngine, Engine, EngineError, PlanarEngine};
+use crate::engine::{BulletEngine, Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::model::{Mount, Robot};
 use crate::recording::{GroundMeta, Meta};
 
@@ -51,6 +51,8 @@ pub struct Experiment {
     pub engine: EngineKind,
     /// Where the robot starts from.
     pub start: Start,
+    /// How the planar engine treats sliding.
+    pub friction: FrictionModel,
     /// How the time step was chosen, if the program chose it.
     pub step_choice: Option<StepChoice>,
     /// The keys as they were given.
@@ -85,6 +87,7 @@ impl Experiment {
             EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
             EngineKind::Planar => {
                 let mut engine = PlanarEngine::new(&self.robot, self.time_step)?;
+                engine.set_friction_model(self.friction);
                 if self.start == Start::Settled {
                     let mut voltages = vec![0.0; self.robot.actuators];
                     self.drive.voltages(0.0, &mut voltages);

@@ -6,6 +6,7 @@ use super::config::{Config, ConfigError, DriveConfig, Fault, PhaseConfig, Source
 use super::{EngineKind, Experiment, Start, auto, drive_csv};
 use crate::drive::gait::{self, Parameter};
 use crate::drive::{Drive, Waveform};
+use crate::engine::FrictionModel;
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
 use crate::model::{Damping, Film, Friction, Material, ModelError, Mount, Robot};
 
@@ -63,6 +64,11 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
     if start == Start::Settled && engine == EngineKind::Bullet {
         return Err(Fault::new("simulation.start", "settled needs engine = \"planar\"; the reference starts flat").into());
     }
+    let models = [("convex", FrictionModel::Convex), ("coulomb", FrictionModel::Coulomb)];
+    let friction = choose("simulation.friction", config.simulation.friction.as_deref(), FrictionModel::default(), &models)?;
+    if config.simulation.friction.is_some() && engine == EngineKind::Bullet {
+        return Err(Fault::new("simulation.friction", "belongs to engine = \"planar\"; Bullet has a model of its own").into());
+    }
     let s = &config.simulation;
     if let Some(StepConfig::Word(word)) = &s.time_step_s {
         if word != "auto" {
@@ -85,7 +91,18 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
     let first = if engine == EngineKind::Bullet { 2.0 * time_step } else { 0.0 };
     let waveform = waveform(&config.drive, &robot, first, folder)?;
     let drive = Drive { waveform, positive_gain: robot.positive_gain };
-    Ok(Experiment { robot, drive, time_step, steps, record_every, engine, start, step_choice: None, config: config.clone() })
+    Ok(Experiment {
+        robot,
+        drive,
+        time_step,
+        steps,
+        record_every,
+        engine,
+        start,
+        friction,
+        step_choice: None,
+        config: config.clone(),
+    })
 }
 
 fn choose<T: Copy>(key: &str, value: Option<&str>, default: T, choices: &[(&str, T)]) -> Result<T, Fault> {

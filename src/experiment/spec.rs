@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::{EngineKind, Experiment, Start};
 use crate::drive::Waveform;
+use crate::engine::FrictionModel;
 use crate::model::{Damping, Film, Mount};
 
 impl Experiment {
@@ -40,6 +41,7 @@ impl Experiment {
             },
             "engine": match self.engine { EngineKind::Bullet => "bullet", EngineKind::Planar => "planar" },
             "start": match self.start { Start::Flat => "flat", Start::Settled => "settled" },
+            "friction_model": match self.friction { FrictionModel::Convex => "convex", FrictionModel::Coulomb => "coulomb" },
             "drive": self.drive_spec(),
             "time_step": self.time_step,
             "steps": self.steps,

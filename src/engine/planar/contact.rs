@@ -79,6 +79,8 @@ pub(super) struct Corner {
     /// From the body's reference point (cm).
     pub(super) arm: [f64; 2],
     touch: Touch,
+    /// Vertical velocity that has been taken off the target's end (cm/s).
+    lift: f64,
     grip: Grip,
     /// Mean velocity w* that stops it on the floor at the end (cm/s).
     target: [f64; 2],
@@ -96,9 +98,24 @@ impl Corner {
     pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, before: [f64; 2], grip: Grip, law: &Law) {
         self.arm = arm;
         self.grip = grip;
+        self.lift = 0.0;
         let ahead = -gap / law.time_step;
         let end = if gap > 0.0 || law.frictionless { ahead } else { (PUSH_OUT * ahead).min(PUSH_OUT_SPEED) };
         self.target = [before[0] * (1.0 - law.weight), before[1] + law.weight * (end - before[1])];
+    }
+
+    /// Takes off the lift that the convex model gives a corner which slides with the body's motion `mean` (De Saxcé's correction), by a step
+    /// of the fixed-point iteration that is damped by 1/(1 + μ); returns how far the lift changed (cm/s).
+    pub(super) fn take_off_lift(&mut self, mean: &Spatial, law: &Law) -> f64 {
+        if self.touch == Touch::Open {
+            return 0.0;
+        }
+        let mu = self.grip.friction;
+        let sliding = (self.velocity_in(mean)[0] - self.target[0]) / law.weight;
+        let by = (mu * sliding.abs() - self.lift) / (1.0 + mu);
+        self.lift += by;
+        self.target[1] -= law.weight * by;
+        by.abs()
     }
 
     /// A corner that nothing touches.

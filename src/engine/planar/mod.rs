@@ -27,11 +27,9 @@
 //! ```
 //!
 //! so a corner never passes the floor: it stops on it, without bounce. Friction is the convex model of Anitescu: its minimum is unique, and
-//! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. Taking that lift off again by fixed-point iterations (De Saxcé) was
-//! tried: they do not converge for the friction of films (4.0) unless they are damped by 1/(1 + μ); then they change speeds of the paper's
-//! sequence by 0.5 % and heights of jumps by less than the step does, and cost as much again, so they were left out. Newton's method over the
-//! corners' states (open,
-//! sticking, sliding) puts active corners into the recursion as terms of their bodies' inertia.
+//! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. [`FrictionModel::Coulomb`] takes that lift off again by a damped
+//! fixed-point iteration over such problems (De Saxcé). Newton's method over the corners' states (open, sticking, sliding) puts active
+//! corners into the recursion as terms of their bodies' inertia.
 //!
 //! # References
 //!
@@ -66,6 +64,16 @@ const NUMERICAL_DAMPING: f64 = 50.0;
 const EXACT_EVERY: u64 = 64;
 const LARGEST_SERIES: f64 = 0.1;
 
+/// How sliding corners are treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FrictionModel {
+    /// One convex problem a step. Sliding lifts a corner by μ·h·|v_t|, so that gaits need steps of 10⁻⁶ s where friction is high.
+    #[default]
+    Convex,
+    /// Coulomb's law, by repeating the step until nothing is lifted: several times the work, for steps a hundred times as long.
+    Coulomb,
+}
+
 /// The robot as a planar chain.
 pub struct PlanarEngine {
     joint: PiezoJoint,
@@ -89,6 +97,7 @@ pub struct PlanarEngine {
     velocity: [f64; 2],
     /// None but for robots on the ground.
     floor: Option<Floor>,
+    friction: FrictionModel,
     /// Mean motions of the reference points in the iterate of the contact problem.
     iterate: Vec<Spatials>,
     law: Law,
@@ -158,6 +167,7 @@ impl PlanarEngine {
             centre: if clamped { [left, 0.0] } else { [moment / mass, 0.0] },
             velocity: [0.0; 2],
             floor: (robot.mount == Mount::Ground).then(|| Floor::new(&frictions, 0.5 * thickness)),
+            friction: FrictionModel::default(),
             iterate: vec![Spatials::default(); rungs.len()],
             rungs,
             law: Law::new(time_step, weight, mass / count as f64),
@@ -172,6 +182,11 @@ impl PlanarEngine {
     /// Contact problems' Newton iterations over all steps so far; 0 for steps without contact.
     pub fn iterations(&self) -> u64 {
         self.iterations
+    }
+
+    /// Chooses how sliding corners are treated.
+    pub fn set_friction_model(&mut self, friction: FrictionModel) {
+        self.friction = friction;
     }
 
     /// Lets the floor rise by `angle` (rad) along +x: in its axes gravity is g (−sin, −cos). The books of energy know level floors only.
