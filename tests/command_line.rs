@@ -388,3 +388,30 @@ fn a_run_goes_on_from_a_saved_state_with_the_same_bits_and_not_from_another_robo
     fs::write(bench.path("cut.json"), cut).unwrap();
     bench.refuses(&["run", "a.toml", "--load-state", "cut.json"], 3, &["cut.json"]);
 }
+
+#[test]
+fn the_planar_engine_chooses_its_step_starts_settled_and_is_judged_by_bullet() {
+    let bench = Bench::new(&CANTILEVER.replace("steps = 200\nrecord_every_steps = 50", "duration_s = 0.1"));
+    let planar = ["run", "a.toml", "--engine", "planar", "--json"];
+    let run = |more: &[&str]| -> serde_json::Value {
+        let output = bench.sfers(&[&planar[..], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let chosen = run(&["--set", "simulation.time_step_s=auto", "--set", "simulation.step_error=0.01"]);
+    assert!(chosen["step_choice"]["change"].as_f64().unwrap() <= 0.01, "{chosen}");
+    assert_eq!(chosen["step_choice"]["time_step_s"], chosen["time_step_s"]);
+    let settled = run(&["--set", "simulation.start=settled"]);
+    assert!(settled["energy"]["kinetic_erg"].as_f64().unwrap() < 1e-12, "{settled}");
+    assert!((settled["measures"]["tip_deflection_mm"].as_f64().unwrap() + 18.987).abs() < 1e-3, "{settled}");
+
+    let judged = bench.sfers(&["crosscheck", "--engines", "a.toml", "--planar-step", "1e-5"]);
+    assert!(judged.status.success() && out(&judged).contains("a.toml: agree"), "{}", out(&judged));
+
+    bench.refuses(&["run", "a.toml", "--engine", "plane"], 2, &["plane", "bullet, planar"]);
+    bench.refuses(&["run", "a.toml", "--set", "simulation.time_step_s=auto"], 2, &["simulation.time_step_s", "planar"]);
+    bench.refuses(&["run", "a.toml", "--set", "simulation.start=settled"], 2, &["simulation.start", "planar"]);
+    bench.refuses(&["run", "a.toml", "--set", "simulation.friction=coulomb"], 2, &["simulation.friction", "planar"]);
+    bench.refuses(&[&planar[..], &["--set", "simulation.time_step_s=0.01"]].concat(), 4, &["0.01 s", "at most"]);
+    bench.refuses(&["crosscheck", "--engines", "a.toml", "--planar-step", "0"], 2, &["--planar-step"]);
+}
