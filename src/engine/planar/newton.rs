@@ -3,6 +3,7 @@
 use wide::f64x2;
 
 use super::contact::Law;
+use super::floor::Floor;
 use super::recursion::{Spatials, solve};
 use super::{EngineError, FrictionModel, PlanarEngine};
 
@@ -38,23 +39,26 @@ enum Search {
 impl PlanarEngine {
     /// Solves the step's mean motion with the floor; false, and nothing done, if no corner is near it.
     pub(super) fn solve_on_floor(&mut self, law: &Law) -> Result<bool, EngineError> {
-        if self.floor.is_none() {
-            return Ok(false);
-        }
+        let Some(mut floor) = self.floor.take() else { return Ok(false) };
+        let solved = self.solve_with(&mut floor, law);
+        self.floor = Some(floor);
+        solved
+    }
+
+    fn solve_with(&mut self, floor: &mut Floor, law: &Law) -> Result<bool, EngineError> {
         let (height, velocity) = (self.root_position(0.5 * self.time_step)[1], self.root_velocity());
-        if !self.floor.as_mut().is_some_and(|floor| floor.find(&self.rungs, height, velocity, law)) {
+        if !floor.find(&self.rungs, height, velocity, law) {
             return Ok(false);
         }
-        self.newton(law)?;
+        self.newton(floor, law)?;
         if self.friction == FrictionModel::Coulomb {
             for _ in 0..LARGEST_LIFTS {
-                let Some(floor) = &mut self.floor else { break };
                 let mut changed = 0.0_f64;
                 floor.near(&self.rungs, |corner, mean| changed = changed.max(corner.take_off_lift(mean, law)));
                 if changed < LIFT_ENOUGH {
                     break;
                 }
-                self.newton(law)?;
+                self.newton(floor, law)?;
             }
         }
         Ok(true)
@@ -64,32 +68,28 @@ impl PlanarEngine {
     ///
     /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
     /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is lowered along the way there.
-    fn newton(&mut self, law: &Law) -> Result<(), EngineError> {
+    fn newton(&mut self, floor: &mut Floor, law: &Law) -> Result<(), EngineError> {
         let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
         for iteration in 1..=largest {
             self.iterations += 1;
-            let Some(floor) = &mut self.floor else { return Ok(()) };
             solve(&mut self.rungs, false, Some((floor, law)));
             let mut agrees = true;
             floor.near(&self.rungs, |corner, mean| agrees &= corner.agrees(mean, law));
             if agrees {
                 return Ok(());
             }
-            match if iteration == 1 { Search::Whole } else { self.search(law) } {
+            match if iteration == 1 { Search::Whole } else { self.search(floor, law) } {
                 Search::Done => return Ok(()),
                 Search::Part => {}
                 Search::Whole => {
                     // After the first solution: its states were a guess, and any motion will do for an iterate.
-                    let Some(floor) = &mut self.floor else { return Ok(()) };
                     floor.near(&self.rungs, |corner, mean| corner.accept(mean, law));
                     for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
                         *iterate = rung.mean;
                     }
                 }
             }
-            if let Some(floor) = &mut self.floor {
-                floor.mark();
-            }
+            floor.mark();
         }
         let time = self.step as f64 * self.time_step;
         Err(EngineError::NotConverged { iterations: largest, step: self.step, time })
@@ -98,8 +98,7 @@ impl PlanarEngine {
     /// Lowers the cost between the iterate and the rungs' mean motion, and moves the iterate there.
     ///
     /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
-    fn search(&mut self, law: &Law) -> Search {
-        let Some(floor) = &mut self.floor else { return Search::Done };
+    fn search(&mut self, floor: &mut Floor, law: &Law) -> Search {
         let (mut metric, mut kinetic) = (f64x2::ZERO, f64x2::ZERO);
         let mut inner = f64x2::ZERO;
         for (k, (rung, iterate)) in self.rungs.iter().zip(&self.iterate).enumerate() {
