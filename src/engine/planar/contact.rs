@@ -248,6 +248,7 @@ impl Corner {
     }
 
     pub(super) fn restore(&mut self, saved: f64) {
+        self.impulse = [0.0; 2];
         self.touch = match saved as u8 {
             1 => Touch::Stick,
             2 => Touch::SlideForward,

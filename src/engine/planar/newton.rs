@@ -21,7 +21,7 @@ const DONE_OF_GRAVITY: f64 = 1e-12;
 const DONE_OF_KINETIC: f64 = 1e-18;
 
 /// Fixed-point iterations towards Coulomb's friction end when no lift changes by more than this (cm/s), or after so many: then the last one
-/// stands. Measured: shorter ends change speeds of the paper's sequence by 2 % and less.
+/// stands. Measured at 5 Hz: a hundredth of this changes speeds of the paper's sequence by 1 % on films of friction 4 and by 3 to 6 % on films of 1.
 const LIFT_ENOUGH: f64 = 0.1;
 const LARGEST_LIFTS: u32 = 100;
 
