@@ -127,7 +127,7 @@ pub fn stable_step(robot: &Robot) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Damping, Film, Friction, Material};
+    use crate::model::{Damping, Extensions, Film, Friction, Material};
 
     fn robot(actuators: usize, motors: usize, mount: Mount, damping: f64) -> Robot {
         Robot {
@@ -140,6 +140,7 @@ mod tests {
             positive_gain: 1.0,
             friction: Friction { ground: 1.0, low: 1.0, high: 1.0, film: Film::None, film_fraction: 0.5 },
             bodies: None,
+            extensions: Extensions::default(),
         }
     }
 

@@ -116,7 +116,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         // Even when quiet: the result is not what was asked for.
         eprintln!("warning: {problem}; no measures are given");
     }
-    let Run { mut recording, interrupted, energy, .. } = run;
+    let Run { mut recording, interrupted, energy, audited, .. } = run;
     let steps = recording.meta.steps;
     if interrupted {
         let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
@@ -134,7 +134,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         Measures::default()
     };
     warnings.extend(trouble);
-    let measures = Measures { energy_error: Some(energy.error()), ..measures };
+    let measures = Measures { energy_error: audited.then(|| energy.error()), ..measures };
     let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);
@@ -150,7 +150,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         let object = json!({
             "schema": 1,
             "measures": measures,
-            "energy": energy,
+            "energy": audited.then_some(energy),
             "time_step_s": experiment.time_step,
             "step_choice": experiment.step_choice,
             "steps": steps,

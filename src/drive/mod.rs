@@ -57,11 +57,14 @@ pub struct Drive {
     pub waveform: Waveform,
     /// Factor on positive voltages (–).
     pub positive_gain: f64,
+    /// How much later than commanded it acts (s); before, what the waveform begins with.
+    pub delay: f64,
 }
 
 impl Drive {
     /// Writes the voltages (V) that reach the torque law at time `t` (s) to `out`, one per actuator.
     pub fn voltages(&self, t: f64, out: &mut [f64]) {
+        let t = if self.delay == 0.0 { t } else { (t - self.delay).max(0.0) };
         match &self.waveform {
             Waveform::Gait { gait, parameter, on_voltages } => {
                 let mask = gait.mask(t, *parameter).bytes();
@@ -105,8 +108,12 @@ impl Drive {
     }
 
     /// Mean voltages (V) from `from` to `to` (s) into `out`: a jump within counts from its moment on, what changes smoothly is taken at the
-    /// middle. `start` holds the voltages at `from` and takes those at `to`, for the next stretch.
+    /// middle, and a table's lines are integrated. `start` holds the voltages at `from` and takes those at `to`, for the next stretch.
     pub fn mean(&self, from: f64, to: f64, start: &mut [f64], out: &mut [f64]) {
+        if let (Waveform::Table(table), true) = (&self.waveform, self.positive_gain == 1.0) {
+            // Exact, also where a table jumps.
+            return table.mean(from - self.delay, to - self.delay, out);
+        }
         if !self.jumps() {
             return self.voltages(0.5 * (from + to), out);
         }
@@ -148,7 +155,7 @@ mod tests {
 
     #[test]
     fn the_mean_over_a_step_counts_a_jump_from_its_moment_on() {
-        let drive = Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0 };
+        let drive = Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0, delay: 0.0 };
         let (mut start, mut mean) = (vec![0.0; 2], vec![f64::NAN; 2]);
         drive.mean(0.0, 0.1, &mut start, &mut mean);
         assert_eq!(mean, [0.0, 0.0]);
@@ -157,14 +164,14 @@ mod tests {
         assert_eq!(start, [-1000.0, 600.0]);
         drive.mean(0.5, 0.6, &mut start, &mut mean);
         assert_eq!(mean, start);
-        let sine = Drive { waveform: Waveform::Sine { amplitudes: vec![-2.0], frequency: 1.0 }, positive_gain: 1.0 };
+        let sine = Drive { waveform: Waveform::Sine { amplitudes: vec![-2.0], frequency: 1.0 }, positive_gain: 1.0, delay: 0.0 };
         sine.mean(0.2, 0.3, &mut [0.0], &mut mean[..1]);
         assert!((mean[0] + 1.0).abs() < 1e-12);
     }
 
     fn at(waveform: Waveform, gain: f64, t: f64) -> Vec<f64> {
         let mut out = vec![f64::NAN; 2];
-        Drive { waveform, positive_gain: gain }.voltages(t, &mut out);
+        Drive { waveform, positive_gain: gain, delay: 0.0 }.voltages(t, &mut out);
         out
     }
 

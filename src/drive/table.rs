@@ -6,6 +6,8 @@ pub struct Table {
     times: Vec<f64>,
     /// Row after row, one value per actuator.
     voltages: Vec<f64>,
+    /// Integrals of the voltages from the first row to every row (V·s).
+    integrals: Vec<f64>,
     actuators: usize,
 }
 
@@ -22,7 +24,15 @@ impl Table {
                 return Err(row);
             }
         }
-        Ok(Self { times, voltages, actuators })
+        let mut integrals = vec![0.0; voltages.len()];
+        for row in 1..times.len() {
+            for a in 0..actuators {
+                let (before, at) = ((row - 1) * actuators + a, row * actuators + a);
+                let mean = 0.5 * (voltages[before] + voltages[at]);
+                integrals[at] = integrals[before] + mean * (times[row] - times[row - 1]);
+            }
+        }
+        Ok(Self { times, voltages, integrals, actuators })
     }
 
     /// The rows' times (s).
@@ -33,6 +43,30 @@ impl Table {
     /// The voltages (V) of row `row`.
     pub fn row(&self, row: usize) -> &[f64] {
         &self.voltages[row * self.actuators..][..self.actuators]
+    }
+
+    /// Writes the mean voltages (V) from `from` to `to` (s) to `out`.
+    pub fn mean(&self, from: f64, to: f64, out: &mut [f64]) {
+        let ends = [from, to].map(|t| self.integral(t));
+        for (a, out) in out.iter_mut().enumerate() {
+            *out = (ends[1](a) - ends[0](a)) / (to - from);
+        }
+    }
+
+    /// The integral of an actuator's voltage from the first row to `t` (V·s).
+    fn integral(&self, t: f64) -> impl Fn(usize) -> f64 + '_ {
+        let row = self.times.partition_point(|&time| time <= t).saturating_sub(1);
+        let past = t - self.times[row];
+        move |a| {
+            let at = row * self.actuators + a;
+            let next = at + self.actuators;
+            // Held before the first and after the last row.
+            let slope = match self.voltages.get(next) {
+                Some(end) if past > 0.0 => (end - self.voltages[at]) / (self.times[row + 1] - self.times[row]),
+                _ => 0.0,
+            };
+            self.integrals[at] + past * (self.voltages[at] + 0.5 * past * slope)
+        }
     }
 
     /// Writes the voltages (V) at time `t` (s) to `out`.
@@ -65,6 +99,16 @@ mod tests {
         {
             table.at(t, &mut out);
             assert_eq!(out, expected, "at {t}");
+        }
+    }
+
+    #[test]
+    fn the_mean_is_that_of_the_lines_and_jumps_between() {
+        let table = Table::new(vec![0.0, 1.0, 1.0 + 1e-9, 2.0], vec![0.0, 10.0, -10.0, -10.0], 1).unwrap();
+        let mut out = [0.0];
+        for (from, to, mean) in [(0.0, 1.0, 5.0), (0.5, 1.0, 7.5), (0.9, 1.1, -0.25), (-1.0, 1.0, 2.5), (1.5, 4.0, -10.0)] {
+            table.mean(from, to, &mut out);
+            assert!((out[0] - mean).abs() < 1e-6, "{from} {to}: {}", out[0]);
         }
     }
 

@@ -4,7 +4,7 @@ use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
 use crate::bullet::{self, BaseState, BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World};
-use crate::model::{Mount, Robot};
+use crate::model::{Extensions, LOSS_TIMES, Mount, Robot};
 
 /// Collision margin of every box (cm), as PyBullet sets it for bodies built by its calls.
 const COLLISION_MARGIN: f64 = 0.001;
@@ -29,6 +29,8 @@ pub struct BulletEngine {
     state: JointState,
     links: Vec<LinkState>,
     touching: Vec<bullet::Contact>,
+    /// What the joints have beyond eq. 1, if anything.
+    beyond: Option<Beyond>,
     clamp_hits: Option<ClampHits>,
 }
 
@@ -47,7 +49,12 @@ impl BulletEngine {
     /// As [`new`](Self::new).
     pub fn with_settings(robot: &Robot, time_step: f64, settings: &SolverSettings) -> Result<Self, EngineError> {
         robot.check()?;
+        let extensions = &robot.extensions;
         let mut world = World::new(settings)?;
+        if extensions.slope != 0.0 {
+            let (sin, cos) = extensions.slope.sin_cos();
+            world.set_gravity([-robot.material.gravity * sin, 0.0, -robot.material.gravity * cos])?;
+        }
         let boxes = boxes(robot);
         let body = world.add_multibody(&boxes[0], &boxes[1..], [0.0; 3])?;
         match robot.mount {
@@ -76,6 +83,7 @@ impl BulletEngine {
             state: JointState { angles: zeros(), rates: zeros(), torques: zeros(), motor_voltages: zeros() },
             links: Vec::with_capacity(joints),
             touching: Vec::new(),
+            beyond: Beyond::new(robot),
             clamp_hits: None,
         })
     }
@@ -102,6 +110,54 @@ impl BulletEngine {
             }
         }
         self.not_finite("a joint".into(), f64::NAN)
+    }
+}
+
+/// Joints with more to them than eq. 1. Like the torque law it acts with the state of a step's beginning.
+struct Beyond {
+    extensions: Extensions,
+    link: f64,
+    /// Rest angle at 0 V of each joint (rad), and factor on its voltage.
+    rest_angles: Vec<f64>,
+    gains: Vec<f64>,
+    /// q_j of the loss ladder of each joint (rad).
+    loss: Vec<[f64; LOSS_TIMES.len()]>,
+}
+
+impl Beyond {
+    fn new(robot: &Robot) -> Option<Self> {
+        let e = &robot.extensions;
+        if !e.bends_torque_law() && e.rest_curvature.is_empty() && e.joint_gains.is_empty() {
+            return None;
+        }
+        let (joints, m) = (robot.joints(), robot.motors_per_actuator);
+        let of_joint = |i: usize| e.rest_curvature.get(i / m).map_or(0.0, |curvature| curvature * robot.link_length());
+        Some(Self {
+            link: robot.link_length(),
+            rest_angles: (0..joints).map(of_joint).collect(),
+            gains: (0..joints).map(|i| e.joint_gains.get(i).copied().unwrap_or(1.0)).collect(),
+            loss: if e.loss == 0.0 { Vec::new() } else { vec![[0.0; LOSS_TIMES.len()]; joints] },
+            extensions: e.clone(),
+        })
+    }
+
+    /// Torque of joint `i` (dyn·cm); its voltage becomes the one that acts.
+    fn torque(&self, i: usize, joint: &PiezoJoint, angle: f64, rate: f64, voltage: &mut f64) -> f64 {
+        *voltage *= self.gains[i];
+        let angle = angle - self.rest_angles[i];
+        let delta = angle - joint.rest_angle_per_volt * *voltage;
+        let stored: f64 = self.loss.get(i).map_or(0.0, |ladder| ladder.iter().sum());
+        joint.torque(angle, rate, *voltage) + self.extensions.torque(joint.stiffness, self.link, delta, rate)
+            - joint.stiffness * self.extensions.loss * stored
+    }
+
+    /// Turns the loss ladder on by a step of `dt` (s) at the joints' rates.
+    fn remember(&mut self, rates: &[f64], dt: f64) {
+        for (ladder, rate) in self.loss.iter_mut().zip(rates) {
+            for (q, time) in ladder.iter_mut().zip(LOSS_TIMES) {
+                *q += dt * (rate - *q / time);
+            }
+        }
     }
 }
 
@@ -150,6 +206,7 @@ fn base_pitch(base: &BaseState) -> f64 {
 impl Engine for BulletEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
         let JointState { angles, rates, torques, motor_voltages } = &mut self.state;
+        let beyond = self.beyond.as_ref();
         self.world.joint_states(self.body, angles, rates)?;
         let m = self.motors_per_actuator as f64;
         let mut sum = 0.0;
@@ -158,7 +215,10 @@ impl Engine for BulletEngine {
             let joints = actuator * self.motors_per_actuator..(actuator + 1) * self.motors_per_actuator;
             for i in joints {
                 motor_voltages[i] = motor_voltage;
-                torques[i] = self.joint.torque(angles[i], rates[i], motor_voltage);
+                torques[i] = match beyond {
+                    None => self.joint.torque(angles[i], rates[i], motor_voltage),
+                    Some(beyond) => beyond.torque(i, &self.joint, angles[i], rates[i], &mut motor_voltages[i]),
+                };
                 // Zero for finite values, NaN otherwise: one test per step instead of one per joint.
                 sum += 0.0 * angles[i] + 0.0 * rates[i];
             }
@@ -248,6 +308,9 @@ impl Engine for BulletEngine {
     fn advance(&mut self) -> Result<(), EngineError> {
         self.world.set_joint_torques(self.body, &self.state.torques)?;
         self.world.step(self.time_step)?;
+        if let Some(beyond) = &mut self.beyond {
+            beyond.remember(&self.state.rates, self.time_step);
+        }
         let clamp = self.world.velocity_clamp(self.body)?;
         if clamp.hit() {
             let hits = self.clamp_hits.get_or_insert(ClampHits { steps: 0, first_step: self.step, limit: clamp.limit });
@@ -258,11 +321,18 @@ impl Engine for BulletEngine {
     }
 
     fn save(&self) -> Result<Vec<f64>, EngineError> {
-        Ok(self.world.snapshot()?.into_vec())
+        let mut state: Vec<f64> = self.beyond.iter().flat_map(|beyond| beyond.loss.iter().flatten().copied()).collect();
+        state.extend(self.world.snapshot()?.into_vec());
+        Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
-        self.world.restore(&Snapshot::from_vec(state.to_vec()))?;
+        let memory = self.beyond.as_ref().map_or(0, |beyond| beyond.loss.as_flattened().len());
+        let (memory, world) = state.split_at_checked(memory).ok_or(EngineError::State)?;
+        self.world.restore(&Snapshot::from_vec(world.to_vec()))?;
+        if let Some(beyond) = &mut self.beyond {
+            beyond.loss.as_flattened_mut().copy_from_slice(memory);
+        }
         self.step = step;
         Ok(())
     }

@@ -4,10 +4,12 @@
 //! torques for the given voltages, and ends with [`advance`](Engine::advance); between the two the state before the step can be
 //! observed. The loop over steps lives in [`experiment::run`](crate::experiment::run).
 
+mod affected;
 mod bullet;
 mod energy;
 mod planar;
 
+pub use affected::AffectedEngine;
 pub use bullet::BulletEngine;
 pub use energy::{Books, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
 pub use planar::{FrictionModel, PlanarEngine};
@@ -52,6 +54,14 @@ pub enum EngineError {
     NoEquilibrium {
         /// Why.
         reason: String,
+    },
+    /// An effect that this engine does not know how to step.
+    #[error("{engine} does not know {what}; try the other engine")]
+    Unsupported {
+        /// The engine.
+        engine: &'static str,
+        /// What of the robot.
+        what: &'static str,
     },
     /// A saved state that is not one of this robot.
     #[error("the state does not fit this robot")]

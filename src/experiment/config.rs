@@ -1,5 +1,6 @@
 //! Experiment files: TOML with units in the keys. Unknown keys are refused, with line and column.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -69,6 +70,17 @@ pub struct Config {
     pub robot: RobotConfig,
     pub drive: DriveConfig,
     pub simulation: SimulationConfig,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<EffectConfig>,
+}
+
+/// One `[[effect]]`: its id and its parameters.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[allow(missing_docs)]
+pub struct EffectConfig {
+    pub id: String,
+    #[serde(flatten)]
+    pub parameters: BTreeMap<String, f64>,
 }
 
 /// `[material]`: a preset and what overrides it.

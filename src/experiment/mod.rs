@@ -11,15 +11,17 @@ mod state;
 
 pub use auto::StepChoice;
 pub use config::{
-    Config, ConfigError, DriveConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
+    Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
     StepConfig,
 };
 pub use resolve::{check, experiment};
+pub(crate) use run::hermite;
 pub use run::{Control, Run, run};
 pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};
-use crate::engine::{BulletEngine, Engine, EngineError, FrictionModel, PlanarEngine};
+use crate::effects::{Applied, Path};
+use crate::engine::{AffectedEngine, BulletEngine, Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::model::{Mount, Robot};
 use crate::recording::{GroundMeta, Meta};
 
@@ -53,6 +55,8 @@ pub struct Experiment {
     pub start: Start,
     /// How the planar engine treats sliding.
     pub friction: FrictionModel,
+    /// Extensions of the model; those that act on robot and drive are in them already.
+    pub effects: Vec<Applied>,
     /// How the time step was chosen, if the program chose it.
     pub step_choice: Option<StepChoice>,
     /// The keys as they were given.
@@ -83,19 +87,22 @@ impl Experiment {
     /// # Errors
     /// [`EngineError`] if the robot cannot be built.
     pub fn engine(&self) -> Result<Box<dyn Engine>, EngineError> {
-        Ok(match self.engine {
+        let mut path = Path::new(&self.effects, self.robot.actuators, self.steps as f64 * self.time_step);
+        let mut voltages = vec![0.0; self.robot.actuators];
+        self.drive.voltages(0.0, &mut voltages);
+        path.settle(&mut voltages);
+        let engine: Box<dyn Engine> = match self.engine {
             EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
             EngineKind::Planar => {
                 let mut engine = PlanarEngine::new(&self.robot, self.time_step)?;
                 engine.set_friction_model(self.friction);
                 if self.start == Start::Settled {
-                    let mut voltages = vec![0.0; self.robot.actuators];
-                    self.drive.voltages(0.0, &mut voltages);
                     engine.settle(&voltages)?;
                 }
                 Box::new(engine)
             }
-        })
+        };
+        Ok(if path.is_empty() { engine } else { Box::new(AffectedEngine::new(engine, path, self.time_step)) })
     }
 
     /// Whether the state before step `step` is recorded: `(step + 1)` a multiple of the interval, or the first or last step.

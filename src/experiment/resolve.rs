@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use super::config::{Config, ConfigError, DriveConfig, Fault, PhaseConfig, Source, StepConfig};
+use super::config::{Config, ConfigError, DriveConfig, EffectConfig, Fault, PhaseConfig, Source, StepConfig};
 use super::{EngineKind, Experiment, Start, auto, drive_csv};
 use crate::drive::gait::{self, Parameter};
 use crate::drive::{Drive, Waveform};
+use crate::effects::{self, Applied, EffectError};
 use crate::engine::FrictionModel;
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
-use crate::model::{Damping, Film, Friction, Material, ModelError, Mount, Robot};
+use crate::model::{Damping, Extensions, Film, Friction, Material, ModelError, Mount, Robot};
 
 /// The reference's `dampingEta` where a file gives no damping.
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
@@ -53,7 +54,8 @@ fn read(source: &Source, trials: bool) -> Result<Experiment, ConfigError> {
 }
 
 fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, Trouble> {
-    let robot = robot(config)?;
+    let mut robot = robot(config)?;
+    let effects = effects(config)?;
     robot.check().map_err(|ModelError::Value { key, value, needed }| {
         Fault::new(key, format!("is {value} in the program's CGS units, but must be {needed}"))
     })?;
@@ -86,11 +88,12 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
             return Err(Fault::new(format!("simulation.{key}"), "belongs to time_step_s = \"auto\"").into());
         }
     }
-    let (time_step, steps, record_every) = simulation(config, &robot)?;
+    let (time_step, steps, record_every) = simulation(config, &robot, effects::time_step_scale(&effects))?;
     // The reference is at 0 V in its first two steps.
     let first = if engine == EngineKind::Bullet { 2.0 * time_step } else { 0.0 };
     let waveform = waveform(&config.drive, &robot, first, folder)?;
-    let drive = Drive { waveform, positive_gain: robot.positive_gain };
+    let mut drive = Drive { waveform, positive_gain: robot.positive_gain, delay: 0.0 };
+    effects::apply(&effects, &mut robot, &mut drive).map_err(|error| Fault::new("effect", error.to_string()))?;
     Ok(Experiment {
         robot,
         drive,
@@ -100,9 +103,24 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
         engine,
         start,
         friction,
+        effects,
         step_choice: None,
         config: config.clone(),
     })
+}
+
+/// The `[[effect]]` tables with their values checked; those at their off values are left out.
+fn effects(config: &Config) -> Result<Vec<Applied>, Fault> {
+    let read = |table: &EffectConfig| {
+        let effect = effects::find(&table.id).ok_or_else(|| EffectError::Unknown(table.id.clone()))?;
+        effect.with(table.parameters.iter().map(|(name, value)| (name.as_str(), *value)))
+    };
+    let place = |(index, table)| {
+        read(table).map_err(|error: EffectError| Fault::new("effect", format!("table {}: {error}", index + 1)))
+    };
+    let mut effects: Vec<_> = config.effect.iter().enumerate().map(place).collect::<Result<_, _>>()?;
+    effects.retain(|applied| !applied.is_off());
+    Ok(effects)
 }
 
 fn choose<T: Copy>(key: &str, value: Option<&str>, default: T, choices: &[(&str, T)]) -> Result<T, Fault> {
@@ -173,11 +191,12 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
             film_fraction: f.film_fraction.unwrap_or(0.5),
         },
         bodies: None,
+        extensions: Extensions::default(),
     })
 }
 
 /// Time step (s), number of steps, and steps between records.
-fn simulation(config: &Config, robot: &Robot) -> Result<(f64, u64, u64), Fault> {
+fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u64), Fault> {
     let s = &config.simulation;
     let positive = |key: &str, value: f64| {
         if value.is_finite() && value > 0.0 {
@@ -189,7 +208,7 @@ fn simulation(config: &Config, robot: &Robot) -> Result<(f64, u64, u64), Fault> 
     let Some(StepConfig::Seconds(time_step)) = s.time_step_s else {
         return Err(Fault::new("simulation.time_step_s", "is missing"));
     };
-    positive("simulation.time_step_s", time_step)?;
+    let time_step = positive("simulation.time_step_s", time_step)? * scale;
     if time_step < 1e-12 {
         return Err(Fault::new("simulation.time_step_s", format!("is {time_step} s; the least is 1e-12 s")));
     }

@@ -1,6 +1,7 @@
 //! The loop over steps.
 
 use super::Experiment;
+use crate::effects::View;
 use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
 
@@ -27,6 +28,8 @@ pub struct Run {
     pub clamp_hits: Option<ClampHits>,
     /// Where energy came from and where it went.
     pub energy: EnergyBalance,
+    /// Whether the books of energy were kept: they know the plain model only.
+    pub audited: bool,
 }
 
 impl Run {
@@ -69,7 +72,7 @@ pub fn run(
     mut observe: impl FnMut(u64) -> Control,
 ) -> Result<Run, EngineError> {
     let mut recorder = Recorder::new(experiment);
-    let mut books = Books::new(&experiment.robot, experiment.time_step);
+    let mut books = experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step));
     let mut voltages = vec![0.0; experiment.robot.actuators];
     let midpoint = engine.midpoint();
     let mut interrupted = false;
@@ -92,7 +95,9 @@ pub fn run(
             experiment.drive.voltages(before, &mut voltages);
         }
         engine.prepare(&voltages)?;
-        books.take(engine)?;
+        if let Some(books) = &mut books {
+            books.take(engine)?;
+        }
         if experiment.records(done) {
             recorder.record(time, engine)?;
         }
@@ -101,7 +106,52 @@ pub fn run(
     }
     let mut recording = recorder.recording;
     recording.meta = experiment.meta(done, String::new());
-    Ok(Run { recording, interrupted, clamp_hits: engine.clamp_hits(), energy: books.balance() })
+    see(&mut recording, &View::new(&experiment.effects));
+    let energy = books.as_ref().map(Books::balance);
+    Ok(Run {
+        recording,
+        interrupted,
+        clamp_hits: engine.clamp_hits(),
+        audited: energy.is_some(),
+        energy: energy.unwrap_or_default(),
+    })
+}
+
+/// Turns the recorded places of the nodes into what is seen of them; velocities stay those of the robot.
+fn see(recording: &mut Recording, view: &View) {
+    if view.is_plain() {
+        return;
+    }
+    let width = 3 * recording.nodes();
+    let late = |row: usize, column: usize| {
+        let (p, v) = (&recording.positions, &recording.velocities);
+        if view.delay == 0.0 {
+            return p[row * width + column];
+        }
+        let at = recording.time[row] - view.delay;
+        let after = recording.time.partition_point(|time| *time <= at).min(recording.len() - 1);
+        // Before the first record the robot stood as in it.
+        let Some(before) = after.checked_sub(1) else { return p[column] };
+        let end = |row: usize| [p[row * width + column], v[row * width + column]];
+        hermite(at, [recording.time[before], recording.time[after]], end(before), end(after))
+    };
+    let mut seen = recording.positions.clone();
+    for row in 0..recording.len() {
+        for node in 0..recording.nodes() {
+            let [x, z] = view.of([late(row, 3 * node), late(row, 3 * node + 2)]);
+            let at = row * width + 3 * node;
+            (seen[at], seen[at + 2]) = (x, z);
+        }
+    }
+    recording.positions = seen;
+}
+
+/// The cubic through position and velocity at both `ends` (s), at the time `t`.
+pub(crate) fn hermite(t: f64, ends: [f64; 2], [p0, v0]: [f64; 2], [p1, v1]: [f64; 2]) -> f64 {
+    let h = ends[1] - ends[0];
+    let s = (t - ends[0]) / h;
+    let (a, b) = (1.0 - s, s);
+    a * a * ((1.0 + 2.0 * s) * p0 + s * h * v0) + b * b * ((1.0 + 2.0 * a) * p1 - a * h * v1)
 }
 
 /// A recording that grows in memory set aside for it.

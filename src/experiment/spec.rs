@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::{EngineKind, Experiment, Start};
 use crate::drive::Waveform;
+use crate::effects::Applied;
 use crate::engine::FrictionModel;
 use crate::model::{Damping, Film, Mount};
 
@@ -47,6 +48,15 @@ impl Experiment {
             "steps": self.steps,
             "record_every_steps": self.record_every,
         });
+        if !self.effects.is_empty() {
+            let values = |applied: &Applied| {
+                let pairs = applied.effect.parameters.iter().zip(&applied.values);
+                let fields = pairs.map(|(p, value)| (p.name.to_owned(), json!(value.clamp(f64::MIN, f64::MAX))));
+                let id = ("id".to_owned(), json!(applied.effect.id));
+                Value::Object(std::iter::once(id).chain(fields).collect())
+            };
+            spec["effects"] = self.effects.iter().map(values).collect();
+        }
         if let Some(bodies) = &self.robot.bodies {
             spec["bodies"] = bodies.iter().map(|b| json!({"length": b.length, "mass": b.mass, "friction": b.friction})).collect();
         }

@@ -11,10 +11,14 @@
 //! | first frequency of the cantilever (Euler-Bernoulli) | 18.1 Hz | 24.0 Hz | 23 Hz measured, 25 Hz simulated |
 //! | static tip at −1000 V, m = 3 | −19.0 mm | −23.4 mm | −20 mm |
 
+mod extensions;
 mod laminate;
 mod robot;
 pub mod units;
 
+pub use extensions::{
+    AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, StickSlip,
+};
 pub use laminate::{Laminate, Material};
 pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, Robot, Segment};
 

@@ -1,6 +1,6 @@
 //! From a laminate to a chain of motor-link units.
 
-use super::{Laminate, Material, ModelError};
+use super::{Extensions, Laminate, Material, ModelError};
 use crate::actuator::PiezoJoint;
 
 /// How the robot is held.
@@ -88,6 +88,8 @@ pub struct Robot {
     pub friction: Friction,
     /// The N·m + 1 bodies, where they were read from a file instead of following from the fields above.
     pub bodies: Option<Vec<Segment>>,
+    /// What it has beyond the plain model.
+    pub extensions: Extensions,
 }
 
 /// One body of the chain: a box of `length` × width × thickness.
@@ -127,18 +129,21 @@ impl Robot {
     /// ```
     pub fn joint(&self) -> PiezoJoint {
         let laminate = Laminate::new(&self.material);
+        let scales = &self.extensions;
         PiezoJoint {
-            stiffness: self.material.width * (laminate.flexural_rigidity / 2.0 / self.half_link_length()),
-            rest_angle_per_volt: -laminate.rotation_per_volt,
-            damping_time: self.damping.time(),
+            stiffness: self.material.width * (laminate.flexural_rigidity / 2.0 / self.half_link_length()) * scales.stiffness_scale,
+            rest_angle_per_volt: -laminate.rotation_per_volt * scales.gain_scale,
+            damping_time: self.damping.time() * scales.damping_scale,
         }
     }
 
     /// The N·m + 1 bodies from left to right. The first and last are half as long and heavy as the others, so that the joints
     /// stand at the middle of the pieces they represent.
     pub fn segments(&self) -> Vec<Segment> {
+        let Extensions { mass_scale, friction_scale, .. } = self.extensions;
         if let Some(bodies) = &self.bodies {
-            return bodies.clone();
+            let scaled = |body: &Segment| Segment { mass: body.mass * mass_scale, friction: body.friction * friction_scale, ..*body };
+            return bodies.iter().map(scaled).collect();
         }
         let m = self.motors_per_actuator as f64;
         let mass = Laminate::new(&self.material).actuator_mass;
@@ -155,8 +160,8 @@ impl Robot {
                 };
                 Segment {
                     length: if end { self.half_link_length() } else { self.link_length() },
-                    mass: if end { mass / (2.0 * m) } else { mass / m },
-                    friction: if on_film { high } else { low },
+                    mass: if end { mass / (2.0 * m) } else { mass / m } * mass_scale,
+                    friction: if on_film { high } else { low } * friction_scale,
                 }
             })
             .collect()
@@ -240,6 +245,7 @@ mod tests {
             positive_gain: 1.0,
             friction: Friction { ground: 1.0, low: 0.2, high: 4.0, film, film_fraction: 0.5 },
             bodies: None,
+            extensions: Extensions::default(),
         }
     }
 

@@ -90,7 +90,7 @@ fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Option<
         return Some(Row { index, measures: none, status: format!("failed: {reason}") });
     }
     let measures = Measures {
-        energy_error: Some(run.energy.error()),
+        energy_error: run.audited.then(|| run.energy.error()),
         ..Measures::of(&run.recording, experiment.robot.mount, experiment.drive.period())
     };
     let measures = sweep.measures.iter().map(|name| measures.get(name)).collect();

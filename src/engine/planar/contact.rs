@@ -17,6 +17,9 @@ const LARGEST_CHANGE: f64 = 150.0;
 const PUSH_OUT: f64 = 0.1;
 const PUSH_OUT_SPEED: f64 = 0.01;
 
+/// Approach speed (cm/s) below which nothing bounces, as in Bullet.
+const LEAST_BOUNCE: f64 = 0.2;
+
 /// What all corners share.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Law {
@@ -71,6 +74,10 @@ impl Grip {
         let share = 1.0 / (1.0 + friction * friction);
         Self { friction, share, slide: [friction * share.sqrt(), share.sqrt()] }
     }
+
+    pub(super) fn friction(&self) -> f64 {
+        self.friction
+    }
 }
 
 /// One bottom corner.
@@ -102,6 +109,14 @@ impl Corner {
         let ahead = -gap / law.time_step;
         let end = if gap > 0.0 || law.frictionless { ahead } else { (PUSH_OUT * ahead).min(PUSH_OUT_SPEED) };
         self.target = [before[0] * (1.0 - law.weight), before[1] + law.weight * (end - before[1])];
+    }
+
+    /// Lets a corner that reaches the floor in this step leave it with the share `restitution` of the speed it comes with (cm/s).
+    pub(super) fn bounce(&mut self, gap: f64, speed: f64, restitution: f64, law: &Law) {
+        let reaches = gap + law.time_step * speed <= 0.0;
+        if restitution > 0.0 && reaches && speed < -LEAST_BOUNCE {
+            self.target[1] = speed + law.weight * (-restitution * speed - speed);
+        }
     }
 
     /// Takes off the lift that the convex model gives a corner which slides with the body's motion `mean` (De Saxcé's correction), by a step

@@ -2,8 +2,10 @@
 
 use wide::f64x2;
 
+use super::LARGEST_FRICTION;
 use super::contact::{Corner, Grip, Law};
 use super::recursion::{Articulated, Rung, Spatial};
+use crate::model::{Extensions, StickSlip};
 
 /// The corners of all bodies. Those that may touch in the step at hand are listed.
 #[derive(Debug, Default)]
@@ -11,6 +13,7 @@ pub(super) struct Floor {
     /// Per rung: at the reference points, then at the other ends, of lane 0 and lane 1 each.
     corners: Vec<[Corner; 4]>,
     grips: Vec<[Grip; 2]>,
+    surface: Option<Surface>,
     half_thickness: f64,
     near: Vec<(usize, usize)>,
     near_before: Vec<(usize, usize)>,
@@ -19,13 +22,34 @@ pub(super) struct Floor {
     touching: Vec<bool>,
 }
 
+/// A floor that returns some of an impact, or whose friction depends on speed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Surface {
+    restitution: f64,
+    stick_slip: StickSlip,
+}
+
+impl Surface {
+    /// None for a plain floor.
+    pub(super) fn new(extensions: &Extensions) -> Option<Self> {
+        let Extensions { restitution, stick_slip, .. } = *extensions;
+        (restitution != 0.0 || stick_slip != StickSlip::OFF).then_some(Self { restitution, stick_slip })
+    }
+
+    /// Friction at the sliding speed and normal force that the step begins with.
+    fn grip(&self, plain: Grip, speed: f64, normal: f64) -> Grip {
+        Grip::new(self.stick_slip.friction(plain.friction(), speed, normal).min(LARGEST_FRICTION))
+    }
+}
+
 impl Floor {
     /// Corners with the coefficients of friction of both bodies of each rung, under boxes of twice `half_thickness` (cm).
-    pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64) -> Self {
+    pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
         let count = frictions.len();
         Self {
             corners: vec![[Corner::default(); 4]; count],
             grips: frictions.iter().map(|pair| pair.map(Grip::new)).collect(),
+            surface,
             half_thickness,
             near: Vec::with_capacity(4 * count),
             near_before: Vec::with_capacity(4 * count),
@@ -66,7 +90,15 @@ impl Floor {
                     if near & (1 << lane) != 0 && rung.mass.as_array()[lane] > 0.0 {
                         let slot = 2 * end + lane;
                         let before = [before[0][lane], before[1][lane]];
-                        self.corners[k][slot].place([x[lane], z[lane]], gap[lane], before, self.grips[k][lane], law);
+                        let corner = &mut self.corners[k][slot];
+                        let (gap, mut grip) = (gap[lane], self.grips[k][lane]);
+                        if let Some(surface) = &self.surface {
+                            grip = surface.grip(grip, before[0], corner.impulse(law)[1] / law.reach().0);
+                        }
+                        corner.place([x[lane], z[lane]], gap, before, grip, law);
+                        if let Some(surface) = &self.surface {
+                            corner.bounce(gap, before[1], surface.restitution, law);
+                        }
                         self.is_near[k][slot] = true;
                         self.near.push((k, slot));
                     }

@@ -37,6 +37,7 @@
 //! Eng. 39 (1996) (time stepping with complementarity). M. Anitescu, Math. Program. 105 (2006) (the convex model). A. Castro et al., arXiv
 //! 2110.10107 (regularised cones and Newton's method).
 
+mod beyond;
 mod contact;
 mod floor;
 mod newton;
@@ -45,13 +46,14 @@ mod statics;
 
 use wide::f64x2;
 
+use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
-use self::floor::{Floor, next};
-use self::recursion::{Rung, Spatials, solve};
+use self::floor::{Floor, Surface, next};
+use self::recursion::{Hold, Rung, Spatials, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
-use crate::model::{Mount, Robot};
+use crate::model::{Mount, PointMass, Robot, Segment};
 
 /// Bullet's limit on the product of two friction coefficients, kept for equal friction.
 const LARGEST_FRICTION: f64 = 10.0;
@@ -79,6 +81,11 @@ pub struct PlanarEngine {
     joint: PiezoJoint,
     motors_per_actuator: usize,
     mount: Mount,
+    hold: Hold,
+    /// Rest angle of each joint at 0 V (rad) and factor on its voltage, where there are such.
+    rest_angles: Vec<f64>,
+    gains: Vec<f64>,
+    beyond: Option<Beyond>,
     time_step: f64,
     stable_step: f64,
     gravity: f64,
@@ -116,6 +123,14 @@ impl PlanarEngine {
     /// # Errors
     /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::StepTooLong`].
     pub fn new(robot: &Robot, time_step: f64) -> Result<Self, EngineError> {
+        Self::with_numerical_damping(robot, time_step, NUMERICAL_DAMPING)
+    }
+
+    /// The same with another weight of the step's end: ½ + `damping` (1/s) times the step. Less is more exact for a robot that touches nothing.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_numerical_damping(robot: &Robot, time_step: f64, damping: f64) -> Result<Self, EngineError> {
         robot.check()?;
         let longest = 0.1 / (analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2));
         if time_step.is_nan() || time_step > longest {
@@ -125,8 +140,10 @@ impl PlanarEngine {
         let count = segments.len();
         let joint = robot.joint();
         let thickness = robot.collision_thickness;
-        let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
-        let weight = (0.5 + NUMERICAL_DAMPING * time_step).min(1.0);
+        let extensions = &robot.extensions;
+        let bodies = Body::of(&segments, thickness, &extensions.point_masses);
+        let mass: f64 = bodies.iter().map(|body| body.mass).sum();
+        let weight = (0.5 + damping * time_step).min(1.0);
         let implicit = weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step);
         let clamped = robot.mount == Mount::Clamped;
         let root = if clamped { 0 } else { count / 2 };
@@ -135,9 +152,10 @@ impl PlanarEngine {
         for (i, segment) in segments.iter().enumerate() {
             let (rung, lane) = place(i, root);
             let at = &mut rungs[rung];
-            put(&mut at.mass, lane, segment.mass);
-            put(&mut at.share, lane, segment.mass / mass);
-            put(&mut at.inertia, lane, segment.mass / 12.0 * (segment.length.powi(2) + thickness.powi(2)));
+            put(&mut at.mass, lane, bodies[i].mass);
+            put(&mut at.share, lane, bodies[i].mass / mass);
+            put(&mut at.inertia, lane, bodies[i].inertia);
+            put(&mut at.middle, lane, if i < root { 1.0 - bodies[i].middle } else { bodies[i].middle });
             put(&mut at.reach, lane, if i < root { -segment.length } else { segment.length });
             put(&mut at.stiffness, lane, joint.stiffness);
             put(&mut at.implicit, lane, implicit);
@@ -146,19 +164,36 @@ impl PlanarEngine {
         // The base's centre stands at the origin, as in Bullet.
         let left = -0.5 * segments[0].length;
         let (mut at, mut moment) = (left, 0.0);
-        for segment in &segments {
-            moment += segment.mass * (at + 0.5 * segment.length);
+        for (segment, body) in segments.iter().zip(&bodies) {
+            moment += body.mass * (at + body.middle * segment.length);
             at += segment.length;
         }
+        let hold = match robot.mount {
+            Mount::Clamped if extensions.clamp_compliance > 0.0 => Hold::Hinged,
+            Mount::Clamped => Hold::Clamped,
+            _ => Hold::Free,
+        };
+        if hold == Hold::Hinged {
+            let stiffness = 1.0 / extensions.clamp_compliance;
+            put(&mut rungs[0].stiffness, 0, stiffness);
+            put(&mut rungs[0].implicit, 0, weight * time_step * stiffness * 0.5 * time_step);
+        }
+        let m = robot.motors_per_actuator;
+        let rest_angles =
+            extensions.rest_curvature.iter().flat_map(|curvature| vec![curvature * robot.link_length(); m]).collect();
         let joints = || vec![0.0; count - 1];
         Ok(Self {
             joint,
             motors_per_actuator: robot.motors_per_actuator,
             mount: robot.mount,
+            hold,
+            rest_angles,
+            gains: extensions.joint_gains.clone(),
+            beyond: Beyond::new(extensions, robot.material.width, robot.link_length(), time_step, &rungs),
             time_step,
             stable_step: analytic::stable_step(robot),
             gravity: robot.material.gravity,
-            pull: [0.0, -robot.material.gravity],
+            pull: pull(robot.material.gravity, extensions.slope),
             mass,
             count,
             root,
@@ -166,7 +201,7 @@ impl PlanarEngine {
             kept: vec![[f64x2::ZERO; 2]; rungs.len()],
             centre: if clamped { [left, 0.0] } else { [moment / mass, 0.0] },
             velocity: [0.0; 2],
-            floor: (robot.mount == Mount::Ground).then(|| Floor::new(&frictions, 0.5 * thickness)),
+            floor: (robot.mount == Mount::Ground).then(|| Floor::new(&frictions, 0.5 * thickness, Surface::new(extensions))),
             friction: FrictionModel::default(),
             iterate: vec![Spatials::default(); rungs.len()],
             rungs,
@@ -191,7 +226,7 @@ impl PlanarEngine {
 
     /// Lets the floor rise by `angle` (rad) along +x: in its axes gravity is g (−sin, −cos). The books of energy know level floors only.
     pub fn set_slope(&mut self, angle: f64) {
-        self.pull = [-self.gravity * angle.sin(), -self.gravity * angle.cos()];
+        self.pull = pull(self.gravity, angle);
     }
 
     fn clamped(&self) -> bool {
@@ -240,14 +275,14 @@ impl PlanarEngine {
         seen
     }
 
-    /// Mean over the mass of what each rung says of its reference points, walked from the root's, and of half of what it says of its other
+    /// Mean over the mass of what each rung says of its reference points, walked from the root's, and of its part of what it says of its other
     /// ends.
     fn mean(&self, across: impl Fn(&Rung) -> [f64x2; 2]) -> [f64; 2] {
         let (mut at, mut sum) = ([f64x2::ZERO; 2], [f64x2::ZERO; 2]);
         for (k, rung) in self.rungs.iter().enumerate() {
             let across = across(rung);
             for i in 0..2 {
-                sum[i] += rung.share * (at[i] + f64x2::HALF * across[i]);
+                sum[i] += rung.share * (at[i] + rung.middle * across[i]);
                 at[i] = next(at[i], across[i], k);
             }
         }
@@ -292,16 +327,85 @@ impl PlanarEngine {
         [0, 1].map(|k| self.lengths[i] * self.of_body(i, |rung| rung.along[k]))
     }
 
+    /// Solves the step's mean motion, again and again where joints rub.
+    fn solve_step(&mut self, share: f64) -> Result<(), EngineError> {
+        let Some(mut beyond) = self.beyond.take() else { return self.solve_once() };
+        beyond.begin(&self.rungs);
+        let mut result = Ok(());
+        for repetition in 1..=LARGEST_REPETITIONS {
+            beyond.load(&mut self.rungs, share);
+            result = self.solve_once();
+            if result.is_err() || beyond.accept(&self.rungs) || !beyond.is_repeated() {
+                break;
+            }
+            if repetition == LARGEST_REPETITIONS {
+                let time = self.step as f64 * self.time_step;
+                result = Err(EngineError::NotConverged { iterations: repetition, step: self.step, time });
+            }
+        }
+        beyond.end();
+        self.beyond = Some(beyond);
+        result
+    }
+
+    fn solve_once(&mut self) -> Result<(), EngineError> {
+        if !self.solve_on_floor(&self.law.clone())? {
+            solve(&mut self.rungs, self.hold, None);
+        }
+        Ok(())
+    }
+
     /// Sets the joints' parts of the step's right side: `share` (s) of their torques at the angles as they are.
     fn load_torques(&mut self, share: f64) {
         let share = f64x2::splat(-share);
         let mut inner = f64x2::splat(self.rungs[0].angle.to_array()[0]);
+        if self.hold == Hold::Hinged {
+            let root = &mut self.rungs[0];
+            root.torque = share * root.stiffness * root.angle;
+        }
         for rung in self.rungs.iter_mut().skip(1) {
             // Spring and drive at the start; the implicit part adds what the mean rate makes.
             rung.torque = share * rung.stiffness * (rung.angle - inner - rung.rest_angle);
             inner = rung.angle;
         }
     }
+}
+
+/// Mass (g), inertia about the centre of mass (g·cm²), and where that lies between left end (0) and right end (1).
+struct Body {
+    mass: f64,
+    inertia: f64,
+    middle: f64,
+}
+
+impl Body {
+    /// The boxes with the masses fixed to them.
+    fn of(segments: &[Segment], thickness: f64, masses: &[PointMass]) -> Vec<Self> {
+        let mut left = 0.0;
+        let mut bodies = Vec::with_capacity(segments.len());
+        for (i, segment) in segments.iter().enumerate() {
+            let length = segment.length;
+            let last = i + 1 == segments.len();
+            let inertia = segment.mass / 12.0 * (length.powi(2) + thickness.powi(2));
+            let mut body = Self { mass: segment.mass, inertia, middle: 0.5 };
+            for point in masses.iter().filter(|point| point.position >= left && (point.position < left + length || last)) {
+                let at = ((point.position - left) / length).min(1.0);
+                let apart = (at - body.middle) * length;
+                let sum = body.mass + point.mass;
+                body.inertia += body.mass * point.mass / sum * apart * apart;
+                body.middle += point.mass / sum * (at - body.middle);
+                body.mass = sum;
+            }
+            bodies.push(body);
+            left += length;
+        }
+        bodies
+    }
+}
+
+/// Gravity along x and z (cm/s²) of a floor that rises by `slope` (rad) along +x, in its axes.
+fn pull(gravity: f64, slope: f64) -> [f64; 2] {
+    if slope == 0.0 { [0.0, -gravity] } else { [-gravity * slope.sin(), -gravity * slope.cos()] }
 }
 
 /// Rung and lane of body `i` of a chain with this root.
@@ -339,6 +443,9 @@ impl Engine for PlanarEngine {
         for (joints, volts) in state.motor_voltages.chunks_exact_mut(m).zip(voltages) {
             joints.fill(volts / m as f64);
         }
+        for (volts, gain) in state.motor_voltages.iter_mut().zip(&self.gains) {
+            *volts *= gain;
+        }
         let lag = f64x2::splat(self.joint.damping_time);
         let first = &self.rungs[0];
         let mut inner = [first.angle, first.motion[0]].map(|value| f64x2::splat(value.to_array()[0]));
@@ -350,10 +457,17 @@ impl Engine for PlanarEngine {
             // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
             let per_volt = self.joint.rest_angle_per_volt;
             rung.rest_angle = f64x2::new([per_volt * volts(left), -per_volt * volts(Some(right))]);
+            if !self.rest_angles.is_empty() {
+                let rest = |joint: Option<usize>| joint.and_then(|i| self.rest_angles.get(i)).copied().unwrap_or(0.0);
+                rung.rest_angle += f64x2::new([rest(left), -rest(Some(right))]);
+            }
             let (angle, rate) = (rung.angle - inner[0], rung.motion[0] - inner[1]);
             inner = [rung.angle, rung.motion[0]];
             check += f64x2::ZERO * (angle + rate);
-            let torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
+            let mut torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
+            if let Some(beyond) = &self.beyond {
+                torque -= beyond.now(k, rung, angle - rung.rest_angle, rate);
+            }
             let [angle, rate, torque] = [angle, rate, torque].map(f64x2::to_array);
             if let Some(i) = left {
                 (state.angles[i], state.rates[i], state.torques[i]) = (angle[0], rate[0], -torque[0]);
@@ -442,11 +556,14 @@ impl Engine for PlanarEngine {
         let pull = self.pull.map(|part| f64x2::splat(share * part));
         for rung in &mut self.rungs {
             let [rate, x, z] = rung.motion;
-            rung.load([rung.inertia * rate, rung.mass * (x + pull[0]), rung.mass * (z + pull[1])]);
+            let mut momentum = [rung.inertia * rate, rung.mass * (x + pull[0]), rung.mass * (z + pull[1])];
+            if let Some(beyond) = self.beyond.as_ref().filter(|beyond| beyond.has_drag()) {
+                let drag = beyond.drag(rung);
+                (0..3).for_each(|k| momentum[k] += f64x2::splat(share) * drag[k]);
+            }
+            rung.load(momentum);
         }
-        if !self.solve_on_floor(&self.law.clone())? {
-            solve(&mut self.rungs, self.mount == Mount::Clamped, None);
-        }
+        self.solve_step(share)?;
         let (step, per_weight) = (f64x2::splat(h), f64x2::splat(1.0 / self.weight));
         let (mut momentum, mut changed) = ([f64x2::ZERO; 2], f64x2::ZERO);
         for rung in &mut self.rungs {
@@ -499,20 +616,23 @@ impl Engine for PlanarEngine {
         state.extend(bodies().flat_map(|i| [0, 1].map(|k| self.of_body(i, |rung| rung.along[k]))));
         state.extend(bodies().map(|i| self.of_body(i, |rung| rung.posed)));
         state.extend(self.floor.iter().flat_map(Floor::saved));
+        state.extend(self.beyond.iter().flat_map(Beyond::saved));
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
         let count = self.count;
         let corners = self.floor.iter().flat_map(Floor::saved).count();
-        if state.len() != 7 * count + 4 + corners || state.iter().any(|value| !value.is_finite()) {
+        let memory = self.beyond.iter().flat_map(Beyond::saved).count();
+        if state.len() != 7 * count + 4 + corners + memory || state.iter().any(|value| !value.is_finite()) {
             return Err(EngineError::State);
         }
         let (angles, rest) = state.split_at(count);
         let (motions, rest) = rest.split_at(3 * count);
         let (centre, rest) = rest.split_at(4);
         let (along, rest) = rest.split_at(2 * count);
-        let (posed, corners) = rest.split_at(count);
+        let (posed, rest) = rest.split_at(count);
+        let (corners, memory) = rest.split_at(corners);
         for i in 0..count {
             let (rung, lane) = place(i, self.root);
             let at = &mut self.rungs[rung];
@@ -524,6 +644,9 @@ impl Engine for PlanarEngine {
         (self.centre, self.velocity) = ([centre[0], centre[1]], [centre[2], centre[3]]);
         if let Some(floor) = &mut self.floor {
             floor.restore(corners);
+        }
+        if let Some(beyond) = &mut self.beyond {
+            beyond.restore(memory);
         }
         self.step = step;
         Ok(())

@@ -4,7 +4,7 @@ use wide::f64x2;
 
 use super::contact::Law;
 use super::floor::Floor;
-use super::recursion::{Spatials, solve};
+use super::recursion::{Hold, Spatials, solve};
 use super::{EngineError, FrictionModel, PlanarEngine};
 
 /// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured: 41 in the paper's robots; when a
@@ -72,7 +72,7 @@ impl PlanarEngine {
         let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
         for iteration in 1..=largest {
             self.iterations += 1;
-            solve(&mut self.rungs, false, Some((floor, law)));
+            solve(&mut self.rungs, Hold::Free, Some((floor, law)));
             let mut agrees = true;
             floor.near(&self.rungs, |corner, mean| agrees &= corner.agrees(mean, law));
             if agrees {

@@ -31,6 +31,8 @@ pub(super) struct Rung {
     pub(super) stiffness: f64x2,
     /// What spring and damper of the joint at the reference point add to that joint's inertia.
     pub(super) implicit: f64x2,
+    /// Where the centre of mass lies between the reference point (0) and the other end (1).
+    pub(super) middle: f64x2,
     /// Angle above the x axis (rad), counted anticlockwise.
     pub(super) angle: f64x2,
     /// Rate (rad/s) and velocity of the centre of mass (cm/s).
@@ -55,12 +57,12 @@ pub(super) struct Rung {
 impl Rung {
     /// Bodies without mass, whose joints do nothing.
     pub(super) fn empty() -> Self {
-        Self { implicit: f64x2::ONE, along: [f64x2::ONE, f64x2::ZERO], ..Self::default() }
+        Self { implicit: f64x2::ONE, middle: f64x2::HALF, along: [f64x2::ONE, f64x2::ZERO], ..Self::default() }
     }
 
     /// Velocity of the centres of mass relative to the reference points, for a unit turn, is (−z, x) of this.
     fn half(&self) -> [f64x2; 2] {
-        self.across.map(|part| part * f64x2::HALF)
+        self.across.map(|part| part * self.middle)
     }
 
     /// Mean motion of the other ends.
@@ -115,8 +117,7 @@ impl Arms {
         let [wx, wz] = [-rung.across[1], rung.across[0]];
         let [_, i01, i02, i11, i12, i22] = *inertia;
         let (bx, bz) = (i11 * wx + i12 * wz, i12 * wx + i22 * wz);
-        // The body: its centre of mass lies half way.
-        let (hx, hz) = (f64x2::HALF * wx, f64x2::HALF * wz);
+        let (hx, hz) = (rung.middle * wx, rung.middle * wz);
         let (mx, mz) = (rung.mass * hx, rung.mass * hz);
         inertia[0] += (wx * (i01 + i01 + bx) + wz * (i02 + i02 + bz)) + (rung.inertia + mx * hx + mz * hz);
         inertia[1] += bx + mx;
@@ -191,8 +192,19 @@ impl Articulated {
     }
 }
 
+/// What the root hangs on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Hold {
+    /// Nothing.
+    Free,
+    /// The world.
+    Clamped,
+    /// A hinge at its reference point, with the rung's own torque and implicit terms.
+    Hinged,
+}
+
 /// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. A chain without `floor` touches nothing.
-pub(super) fn solve(rungs: &mut [Rung], clamped: bool, floor: Option<(&Floor, &Law)>) {
+pub(super) fn solve(rungs: &mut [Rung], hold: Hold, floor: Option<(&Floor, &Law)>) {
     let Some((root, arms)) = rungs.split_first_mut() else { return };
     let mut chain = Arms::default();
     for (k, rung) in arms.iter_mut().enumerate().rev() {
@@ -204,8 +216,12 @@ pub(super) fn solve(rungs: &mut [Rung], clamped: bool, floor: Option<(&Floor, &L
         }
         chain.through_joints(rung);
     }
-    let motion = if clamped {
+    let motion = if hold == Hold::Clamped {
         [0.0; 3]
+    } else if hold == Hold::Hinged {
+        let whole = chain.at_root(root);
+        let [torque, implicit] = [root.torque, root.implicit].map(|value| value.to_array()[0]);
+        [(whole.force[0] + torque) / (whole.inertia[0] + implicit), 0.0, 0.0]
     } else {
         let mut whole = chain.at_root(root);
         if let Some((floor, law)) = floor

@@ -72,8 +72,15 @@ impl PlanarEngine {
                 rung.load([f64x2::ZERO, body.mass * pull[0], body.mass * pull[1]]);
             }
             self.load_torques(1.0);
+            if let Some(beyond) = &self.beyond {
+                let mut inner = f64x2::splat(self.rungs[0].angle.to_array()[0]);
+                for rung in self.rungs.iter_mut().skip(1) {
+                    rung.torque += beyond.at_rest(rung, rung.angle - inner - rung.rest_angle);
+                    inner = rung.angle;
+                }
+            }
             if !self.solve_on_floor(&law)? {
-                solve(&mut self.rungs, self.mount == Mount::Clamped, None);
+                solve(&mut self.rungs, self.hold, None);
             }
             let turns = self.rungs.iter().flat_map(|rung| rung.mean[0].to_array());
             let largest = turns.map(f64::abs).fold(0.0, f64::max);

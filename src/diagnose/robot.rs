@@ -1,0 +1,401 @@
+//! Our robots as a plant: the planar engine, the effects, and the markers of a data set.
+
+use super::dataset::Dataset;
+use super::plant::{Candidate, Free, Plant, Signal, Term};
+use super::quality;
+use super::voltage::Command;
+use crate::analytic;
+use crate::drive::{Drive, Waveform};
+use crate::effects::{self, Action, Applied, EFFECTS, Kind, Parameter, Path, View};
+use crate::engine::{Engine, PlanarEngine};
+use crate::experiment::hermite;
+use crate::model::{Mount, Robot};
+
+/// Joints per actuator that are tried: what lies beyond changes a cantilever's frequency by less than 0.06 %.
+const JOINTS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20];
+/// Time steps of a clamped robot follow its slowest mode and the rows; those of a robot on the ground follow impacts.
+const STEPS_PER_PERIOD: f64 = 220.0;
+const GROUND_STEP: f64 = 1e-4;
+/// Of a clamped robot (1/s): a tenth of the engine's own, which at resonance would take 0.2 % of the amplitude.
+const NUMERICAL_DAMPING: f64 = 5.0;
+
+/// A data set with its robot.
+pub struct RobotPlant {
+    robot: Robot,
+    /// Marker positions (cm).
+    markers: Vec<f64>,
+    channels: Vec<String>,
+    commands: Vec<Command>,
+    signals: Vec<Signal>,
+    /// Per run: the time (s) at which its rows begin, and its time step (s).
+    starts: Vec<f64>,
+    durations: Vec<f64>,
+    steps: Vec<f64>,
+    candidates: Vec<Candidate>,
+    step_scale: f64,
+}
+
+impl RobotPlant {
+    /// The plant of a data set whose values have passed [`quality`].
+    pub fn new(dataset: &Dataset, values: &quality::Checked) -> Self {
+        let robot = dataset.robot.clone();
+        let (mut commands, mut signals, mut starts, mut steps) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (run, checked) in dataset.runs.iter().zip(&values.runs) {
+            let n = robot.actuators;
+            let start = run.times[0];
+            let times: Vec<f64> = run.times.iter().map(|t| t - start).collect();
+            let volts: Vec<f64> = run.voltages.iter().map(|v| if *v > 0.0 { v * robot.positive_gain } else { *v }).collect();
+            commands.push(Command::new(&times, &volts, n));
+            let mut signal = Signal {
+                id: run.id.clone(),
+                values: Vec::new(),
+                sigmas: Vec::new(),
+                times: Vec::new(),
+                channels: Vec::new(),
+                inputs: Vec::new(),
+            };
+            for (channel, (column, good)) in run.channels.iter().zip(checked).enumerate() {
+                for (row, value) in column.iter().enumerate().filter(|(row, _)| good[*row]) {
+                    signal.values.push(*value);
+                    signal.sigmas.push(values.noise[channel]);
+                    signal.times.push(times[row]);
+                    signal.channels.push(channel);
+                    signal.inputs.push(run.voltages[row * n]);
+                }
+            }
+            signals.push(signal);
+            starts.push(start);
+            steps.push(step(&robot, &times));
+        }
+        let candidates = candidates(&robot, &dataset.markers.len());
+        Self {
+            markers: dataset.markers.iter().map(|marker| marker.position).collect(),
+            channels: dataset.channel_names(),
+            robot,
+            commands,
+            signals,
+            starts,
+            durations: dataset.runs.iter().map(|run| run.times[run.times.len() - 1] - run.times[0]).collect(),
+            steps,
+            candidates,
+            step_scale: 1.0,
+        }
+    }
+
+    /// The time step (s) of a run.
+    pub fn step(&self, run: usize) -> f64 {
+        self.steps[run] * self.step_scale
+    }
+
+    /// The time (s) at which a run's rows begin.
+    pub fn start(&self, run: usize) -> f64 {
+        self.starts[run]
+    }
+
+    /// The command of a run.
+    pub fn command(&self, run: usize) -> &Command {
+        &self.commands[run]
+    }
+
+    /// The nominal robot.
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// The same plant with time steps that are `factor` times as long.
+    pub fn with_steps(mut self, factor: f64) -> Self {
+        self.step_scale = factor;
+        self
+    }
+
+    /// A candidate's coordinates as an effect with values.
+    pub fn applied(&self, term: &Term) -> Result<Applied, String> {
+        let candidate = &self.candidates[term.candidate];
+        let effect = effects::find(candidate.id).ok_or("no such effect")?;
+        let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name, p.value(*x)));
+        effect.with(free.chain(candidate.fixed.iter().copied())).map_err(|error| error.to_string())
+    }
+}
+
+/// A step that fits whole into the rows' interval, if they are even.
+fn step(robot: &Robot, times: &[f64]) -> f64 {
+    let longest = match robot.mount {
+        Mount::Clamped => 1.0 / (STEPS_PER_PERIOD * analytic::cantilever_frequency(robot) / (robot.actuators as f64).powi(2)),
+        _ => GROUND_STEP,
+    };
+    let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    match gaps.get(gaps.len() / 2) {
+        Some(gap) => gap / (gap / longest).ceil(),
+        None => longest,
+    }
+}
+
+/// Coordinates of a parameter: 1/value where off is infinite.
+fn free(p: &'static Parameter) -> Free {
+    let inverse = p.off.is_some_and(f64::is_infinite);
+    let [low, high] = p.bounds;
+    let bounds = match (inverse, low < 0.0) {
+        (false, _) => [low, high],
+        // The least limits that are worth a thought: 100 V, 100 V/s.
+        (true, false) => [0.0, 1.0 / low.max(100.0)],
+        (true, true) => [1.0 / high.min(-100.0), 0.0],
+    };
+    let off = if inverse { Some(0.0) } else { p.off };
+    Free { name: p.name, unit: p.unit, off, bounds, scale: 0.0, inverse }
+}
+
+/// The effects that make sense for a robot, with what is fitted of them, its usual size, and where to start.
+fn candidates(robot: &Robot, markers: &usize) -> Vec<Candidate> {
+    let clamped = robot.mount == Mount::Clamped;
+    let ground = robot.mount == Mount::Ground;
+    let mut all = Vec::new();
+    for effect in EFFECTS.iter().copied() {
+        let fits = match effect.id {
+            "discretisation" => false,
+            "clamp-compliance" => clamped,
+            // With m = 1 nothing but the gain would change; of a single actuator it is the gain.
+            "weak-actuator" => robot.actuators > 1,
+            "passive-margin" => robot.actuators > 1 || *markers > 1,
+            _ => effect.kind != Kind::Ground || ground,
+        };
+        if !fits {
+            continue;
+        }
+        // What is fitted: name and scale; starts; what is given.
+        type Form = (Vec<(&'static str, f64)>, Vec<Vec<f64>>, Vec<(&'static str, f64)>);
+        let one = |name: &'static str, scale: f64, starts: &[f64]| -> Form {
+            (vec![(name, scale)], starts.iter().map(|x| vec![*x]).collect(), Vec::new())
+        };
+        let forms: Vec<Form> = match effect.id {
+            "stiffness" | "actuation-gain" | "areal-mass" => vec![one("scale", 0.1, &[1.05])],
+            "damping" => vec![one("scale", 0.3, &[1.5, 4.0])],
+            "clamp-compliance" => vec![one("compliance_rad_per_n_m", 0.5, &[0.2, 1.0])],
+            "tip-mass" => vec![one("mass_g", 0.1, &[0.05, 0.2])],
+            "initial-curvature" => vec![one("curvature_per_m", 0.2, &[0.1])],
+            "stiffness-softening" => vec![one("softening_mm2", 500.0, &[500.0, -300.0])],
+            "dry-friction" => vec![one("moment_mn_m", 0.1, &[0.05, 0.3])],
+            "structural-damping" => vec![one("loss_factor", 0.02, &[0.02])],
+            "air-drag" => vec![one("drag_coefficient", 1.0, &[1.0, 4.0])],
+            "time-delay" => vec![one("delay_s", 2e-3, &[1e-3, 5e-3])],
+            "saturation" => vec![
+                one("min_v", 2e-4, &[-1.0 / 1300.0, -1.0 / 1000.0, -1.0 / 700.0]),
+                one("max_v", 2e-4, &[1.0 / 1300.0, 1.0 / 800.0, 1.0 / 400.0, 1.0 / 200.0]),
+            ],
+            "slew-limit" => vec![one("rate_v_per_s", 2e-6, &[1e-6, 1e-5, 3e-5])],
+            "driver-lag" => vec![one("time_constant_s", 2e-3, &[1e-3, 5e-3])],
+            "hysteresis" => vec![
+                (
+                    vec![("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3), ("gain", 0.1)],
+                    vec![vec![0.05, 0.2, 0.0, 1.0], vec![0.2, 0.6, 0.0, 1.0]],
+                    vec![("exponent", 1.0), ("plays", 0.0)],
+                ),
+                (
+                    vec![("width", 0.05), ("spread_v", 300.0), ("gain", 0.1)],
+                    vec![vec![0.05, 300.0, 1.0], vec![0.2, 1500.0, 1.0]],
+                    vec![("plays", 1.0)],
+                ),
+            ],
+            "creep" => vec![one("per_decade", 0.02, &[0.02])],
+            "field-dependent-gain" => vec![(
+                vec![("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)],
+                vec![vec![0.05, 0.0]],
+                Vec::new(),
+            )],
+            "polarity-asymmetry" => vec![one("ratio", 0.2, &[1.2])],
+            "weak-actuator" => {
+                (1..=robot.actuators).map(|j| (vec![("gain", 0.1)], vec![vec![0.8]], vec![("actuator", j as f64)])).collect()
+            }
+            "passive-margin" => vec![one("fraction", 0.05, &[0.08])],
+            "ground-friction" => vec![one("scale", 0.2, &[0.8, 1.25])],
+            "stick-slip" => vec![one("static_ratio", 0.2, &[1.2])],
+            "contact-restitution" => vec![one("restitution", 0.1, &[0.1, 0.4])],
+            "ground-slope" => vec![one("angle_deg", 0.5, &[0.5])],
+            "sensor-scale" => vec![one("scale", 0.02, &[1.02])],
+            "sensor-offset" => {
+                vec![(vec![("x_mm", 0.2), ("z_mm", 0.2)], vec![vec![0.1, 0.1]], Vec::new())]
+            }
+            "sensor-delay" => vec![one("delay_s", 2e-3, &[1e-3, 5e-3])],
+            "camera-tilt" => vec![one("angle_deg", 0.5, &[0.3])],
+            _ => Vec::new(),
+        };
+        for (fitted, starts, fixed) in forms {
+            let parameters = fitted.iter().filter_map(|(name, scale)| {
+                let p = effect.parameters.iter().find(|p| p.name == *name)?;
+                Some(Free { scale: *scale, ..free(p) })
+            });
+            all.push(Candidate {
+                id: effect.id,
+                kind: effect.kind.name(),
+                cause: effect.cause,
+                is_constant: effect.kind == Kind::Calibration,
+                is_measurement: effect.kind == Kind::Measurement,
+                parameters: parameters.collect(),
+                fixed,
+                starts,
+            });
+        }
+    }
+    all
+}
+
+impl Plant for RobotPlant {
+    fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
+
+    fn channels(&self) -> Vec<String> {
+        self.channels.clone()
+    }
+
+    fn unit(&self) -> &'static str {
+        "mm"
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    /// Joints per actuator: the nominal number, then every finer one of a fixed ladder.
+    fn resolutions(&self) -> Vec<f64> {
+        let nominal = self.robot.motors_per_actuator;
+        let finer = JOINTS.into_iter().filter(|m| *m > nominal);
+        std::iter::once(nominal).chain(finer).map(|m| m as f64).collect()
+    }
+
+    fn unknowns(&self, run: usize) -> usize {
+        self.commands[run].jumps().len()
+    }
+
+    fn predict(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64]) -> Result<Vec<f64>, String> {
+        let effects = terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
+        let mut robot = self.robot.clone();
+        robot.motors_per_actuator = resolution as usize;
+        let mut drive = Drive { waveform: Waveform::Table(self.commands[run].table(unknowns)), positive_gain: 1.0, delay: 0.0 };
+        effects::apply(&effects, &mut robot, &mut drive).map_err(|error| error.to_string())?;
+        let view = View::new(&effects);
+        let path = Path::new(&effects, robot.actuators, self.durations[run]);
+        let signal = &self.signals[run];
+        // Rows at the same time stand in several channels.
+        let mut times = signal.times.clone();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let seen: Vec<f64> = times.iter().map(|t| (t - view.delay).max(0.0)).collect();
+        let tracks = track(&robot, &drive, path, self.step(run), &self.markers, &seen).map_err(|error| error.to_string())?;
+        let n = self.markers.len();
+        let at = |(t, channel): (&f64, &usize)| {
+            let row = times.partition_point(|time| time < t);
+            let seen = view.of(tracks[row * n + channel / 2]);
+            10.0 * seen[channel % 2]
+        };
+        Ok(signal.times.iter().zip(&signal.channels).map(at).collect())
+    }
+}
+
+/// Follows markers (cm along the robot) at rising `times` (s), from rest at the drive's first voltages: x and z (cm) of every marker, row after
+/// row, from where the left end of the flat robot is.
+///
+/// # Errors
+/// Whatever the engine reports.
+pub fn track(
+    robot: &Robot,
+    drive: &Drive,
+    mut path: Path,
+    longest_step: f64,
+    markers: &[f64],
+    times: &[f64],
+) -> Result<Vec<[f64; 2]>, crate::engine::EngineError> {
+    let h = longest_step;
+    let mut engine = match robot.mount {
+        Mount::Clamped => PlanarEngine::with_numerical_damping(robot, h, NUMERICAL_DAMPING)?,
+        _ => PlanarEngine::new(robot, h)?,
+    };
+    let n = robot.actuators;
+    let mut start = vec![0.0; n];
+    drive.voltages(0.0, &mut start);
+    let mut volts = start.clone();
+    path.settle(&mut volts);
+    engine.settle(&volts)?;
+
+    let segments = robot.segments();
+    let origin = -0.5 * segments[0].length;
+    // Body and share of it where each marker sits.
+    let mut places = Vec::new();
+    for marker in markers {
+        let (mut body, mut left) = (0, 0.0);
+        while body + 1 < segments.len() && left + segments[body].length < *marker {
+            left += segments[body].length;
+            body += 1;
+        }
+        places.push((body, (marker - left) / segments[body].length));
+    }
+    let nodes = robot.joints() + 2;
+    let (mut positions, mut velocities) = (vec![0.0; 3 * nodes], vec![0.0; 3 * nodes]);
+    let mut look = |engine: &mut PlanarEngine, out: &mut Vec<[f64; 4]>| -> Result<(), crate::engine::EngineError> {
+        engine.nodes(&mut positions, &mut velocities)?;
+        out.clear();
+        for (body, share) in &places {
+            let between = |of: &[f64], axis: usize| {
+                let (a, b) = (of[3 * body + axis], of[3 * body + 3 + axis]);
+                a + share * (b - a)
+            };
+            out.push([
+                between(&positions, 0) - origin,
+                between(&positions, 2),
+                between(&velocities, 0),
+                between(&velocities, 2),
+            ]);
+        }
+        Ok(())
+    };
+    let (mut before, mut after): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
+    let mut tracks = Vec::with_capacity(times.len() * markers.len());
+    let (mut step, mut next) = (0_u64, 0);
+    while next < times.len() {
+        let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
+        // Rows that fall on a step take its state; the others lie between two.
+        let here = |t: f64| t <= from + 1e-6 * h;
+        let due = times[next] < to - 1e-6 * h;
+        if due {
+            look(&mut engine, &mut before)?;
+            while next < times.len() && here(times[next]) {
+                tracks.extend(before.iter().map(|[x, z, ..]| [*x, *z]));
+                next += 1;
+            }
+            if next == times.len() {
+                break;
+            }
+        }
+        drive.mean(from, to, &mut start, &mut volts);
+        path.pass(h, &mut volts);
+        engine.prepare(&volts)?;
+        engine.advance()?;
+        step += 1;
+        if times[next] < to - 1e-6 * h {
+            look(&mut engine, &mut after)?;
+            while next < times.len() && times[next] < to - 1e-6 * h {
+                let t = times[next];
+                tracks.extend(before.iter().zip(&after).map(|([x0, z0, u0, w0], [x1, z1, u1, w1])| {
+                    [hermite(t, [from, to], [*x0, *u0], [*x1, *u1]), hermite(t, [from, to], [*z0, *w0], [*z1, *w1])]
+                }));
+                next += 1;
+            }
+        }
+    }
+    if tracks.iter().flatten().all(|value| value.is_finite()) {
+        Ok(tracks)
+    } else {
+        Err(crate::engine::EngineError::NotFinite {
+            what: "a marker".into(),
+            value: f64::NAN,
+            step,
+            time: step as f64 * h,
+            stable_step: analytic::stable_step(robot),
+        })
+    }
+}
+
+/// Whether an action belongs to what is seen, for reports.
+pub fn is_view(applied: &Applied) -> bool {
+    matches!(applied.effect.action, Action::View(_))
+}

@@ -1,0 +1,234 @@
+//! From sampled commands to voltages in time: smooth between rows, straight where the rows are, and with jumps at once.
+//!
+//! A row holds the voltage commanded at its time. What happened between two rows has to be read out of the rows themselves. A sine that is
+//! joined by straight lines loses (π f Δt)²/3 of its amplitude, which at 25 Hz and 2 ms is eight times the noise of a camera; so smooth stretches
+//! get a cubic spline. A jump between two rows took place at an unknown moment between them: [`Command::jumps`] lists these, and the moments are
+//! fitted with each run.
+
+use crate::drive::Table;
+
+/// A change between two rows is a jump if it is this many times as large as the changes beside it, and at least so many volts.
+const JUMP_RATIO: f64 = 5.0;
+const JUMP_LEAST: f64 = 5.0;
+/// A bend at a row is a kink if it is this many times as large as the bends two rows away.
+const KINK_RATIO: f64 = 8.0;
+/// Bends of rounded values (V) below which rows are on a straight line: commands are written to 0.01 V or so.
+const STRAIGHT: f64 = 0.05;
+/// Points that a spline is given between two rows.
+const BETWEEN: usize = 8;
+
+/// A run's sampled command.
+#[derive(Debug, Clone)]
+pub struct Command {
+    times: Vec<f64>,
+    /// Row after row.
+    volts: Vec<f64>,
+    actuators: usize,
+    /// Rows after which some voltage jumps.
+    jumps: Vec<usize>,
+}
+
+impl Command {
+    /// Looks for the jumps of a command: rising times (s) and voltages (V), row after row, one per actuator.
+    pub fn new(times: &[f64], volts: &[f64], actuators: usize) -> Self {
+        let rows = times.len();
+        let change = |row: usize, actuator: usize| (volts[(row + 1) * actuators + actuator] - volts[row * actuators + actuator]).abs();
+        let is_jump = |row: usize| {
+            (0..actuators).any(|a| {
+                let before = if row > 0 { change(row - 1, a) } else { 0.0 };
+                let after = if row + 2 < rows { change(row + 1, a) } else { 0.0 };
+                change(row, a) > JUMP_LEAST + JUMP_RATIO * before.max(after)
+            })
+        };
+        let jumps = (0..rows.saturating_sub(1)).filter(|row| is_jump(*row)).collect();
+        Self { times: times.to_vec(), volts: volts.to_vec(), actuators, jumps }
+    }
+
+    /// The rows after which there is a jump.
+    pub fn jumps(&self) -> &[usize] {
+        &self.jumps
+    }
+
+    /// The interval (s) in which jump `index` took place.
+    pub fn jump_interval(&self, index: usize) -> [f64; 2] {
+        let row = self.jumps[index];
+        [self.times[row], self.times[row + 1]]
+    }
+
+    /// The command in time, with every jump after the given share of its interval (0 to 1).
+    pub fn table(&self, shares: &[f64]) -> Table {
+        let (mut times, mut volts) = (Vec::new(), Vec::new());
+        let mut first = 0;
+        let ends = self.jumps.iter().copied().chain([self.times.len() - 1]);
+        for (piece, last) in ends.enumerate() {
+            // A piece reaches from one jump to the next; its values hold to the jumps.
+            if piece > 0 {
+                let [from, to] = self.jump_interval(piece - 1);
+                let at = (from + shares[piece - 1].clamp(0.0, 1.0) * (to - from)).max(from + 2e-9);
+                let held: Vec<f64> = volts[volts.len() - self.actuators..].to_vec();
+                times.push(at - 1e-9);
+                volts.extend(held);
+                if at < self.times[first] - 1e-9 {
+                    times.push(at);
+                    volts.extend_from_slice(&self.volts[first * self.actuators..][..self.actuators]);
+                }
+            }
+            self.smooth(first, last, &mut times, &mut volts);
+            first = last + 1;
+        }
+        Table::new(times, volts, self.actuators).unwrap_or_else(|_| {
+            // Rows closer together than the jumps' width: the plain rows rise, for that was checked when they were read.
+            Table::new(self.times.clone(), self.volts.clone(), self.actuators).unwrap_or_else(|_| unreachable!("rows rise"))
+        })
+    }
+
+    /// Adds the rows `first..=last` with points of a spline between them where they are curved.
+    fn smooth(&self, first: usize, last: usize, times: &mut Vec<f64>, volts: &mut Vec<f64>) {
+        let curved: Vec<Vec<Option<f64>>> = (0..self.actuators).map(|a| self.slopes(first, last, a)).collect();
+        for row in first..=last {
+            times.push(self.times[row]);
+            volts.extend_from_slice(&self.volts[row * self.actuators..][..self.actuators]);
+            if row == last {
+                break;
+            }
+            let at = row - first;
+            if curved.iter().all(|slopes| slopes[2 * at].is_none()) {
+                continue;
+            }
+            let [t0, t1] = [self.times[row], self.times[row + 1]];
+            for k in 1..=BETWEEN {
+                let s = k as f64 / (BETWEEN + 1) as f64;
+                times.push(t0 + s * (t1 - t0));
+                for (a, slopes) in curved.iter().enumerate() {
+                    let [v0, v1] = [row, row + 1].map(|row| self.volts[row * self.actuators + a]);
+                    let value = match (slopes[2 * at], slopes[2 * at + 1]) {
+                        (Some(m0), Some(m1)) => {
+                            let (h, r) = (t1 - t0, 1.0 - s);
+                            r * r * ((1.0 + 2.0 * s) * v0 + s * h * m0) + s * s * ((1.0 + 2.0 * r) * v1 - r * h * m1)
+                        }
+                        _ => v0 + s * (v1 - v0),
+                    };
+                    volts.push(value);
+                }
+            }
+        }
+    }
+
+    /// Slopes (V/s) at both ends of every interval between rows `first` and `last`, of a natural cubic spline between kinks; none where the
+    /// rows are straight.
+    fn slopes(&self, first: usize, last: usize, actuator: usize) -> Vec<Option<f64>> {
+        let n = last - first;
+        let t: Vec<f64> = self.times[first..=last].to_vec();
+        let v: Vec<f64> = (first..=last).map(|row| self.volts[row * self.actuators + actuator]).collect();
+        // How far a row lies off the line through its neighbours.
+        let bend = |i: usize| {
+            if i == 0 || i >= n {
+                return 0.0;
+            }
+            let s = (t[i] - t[i - 1]) / (t[i + 1] - t[i - 1]);
+            (v[i] - v[i - 1] - s * (v[i + 1] - v[i - 1])).abs()
+        };
+        let mut slopes = vec![None; 2 * n];
+        let is_kink = |i: usize| {
+            let beside = bend(i.saturating_sub(2)).max(bend(i + 2));
+            bend(i) > STRAIGHT && bend(i) > KINK_RATIO * beside
+        };
+        let mut from = 0;
+        for i in 1..=n {
+            if i < n && !is_kink(i) {
+                continue;
+            }
+            if i - from >= 3 && (from + 1..i).any(|k| bend(k) > 0.2 * STRAIGHT) {
+                let m = spline(&t[from..=i], &v[from..=i]);
+                for k in from..i {
+                    (slopes[2 * k], slopes[2 * k + 1]) = (Some(m[k - from]), Some(m[k + 1 - from]));
+                }
+            }
+            from = i;
+        }
+        slopes
+    }
+}
+
+/// Slopes of the natural cubic spline, by Thomas's algorithm. The end conditions are those of parabolas through the first and last three rows,
+/// so that a sine that begins at its turning point keeps its curvature there.
+fn spline(t: &[f64], v: &[f64]) -> Vec<f64> {
+    let n = t.len();
+    let (h, d): (Vec<f64>, Vec<f64>) = (1..n).map(|i| (t[i] - t[i - 1], (v[i] - v[i - 1]) / (t[i] - t[i - 1]))).unzip();
+    let (mut diagonal, mut upper, mut right) = (vec![1.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut lower = vec![0.0; n];
+    right[0] = d[0] - h[0] * (d[1] - d[0]) / (h[0] + h[1]);
+    right[n - 1] = d[n - 2] + h[n - 2] * (d[n - 2] - d[n - 3]) / (h[n - 2] + h[n - 3]);
+    for i in 1..n - 1 {
+        lower[i] = h[i];
+        diagonal[i] = 2.0 * (h[i - 1] + h[i]);
+        upper[i] = h[i - 1];
+        right[i] = 3.0 * (h[i] * d[i - 1] + h[i - 1] * d[i]);
+    }
+    for i in 1..n {
+        let factor = lower[i] / diagonal[i - 1];
+        diagonal[i] -= factor * upper[i - 1];
+        right[i] -= factor * right[i - 1];
+    }
+    let mut slopes = right;
+    slopes[n - 1] /= diagonal[n - 1];
+    for i in (0..n - 1).rev() {
+        slopes[i] = (slopes[i] - upper[i] * slopes[i + 1]) / diagonal[i];
+    }
+    slopes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    fn sampled(n: usize, dt: f64, v: impl Fn(f64) -> f64) -> Command {
+        let times: Vec<f64> = (0..n).map(|i| i as f64 * dt).collect();
+        let volts: Vec<f64> = times.iter().map(|t| (100.0 * v(*t)).round() / 100.0).collect();
+        Command::new(&times, &volts, 1)
+    }
+
+    fn at(table: &Table, t: f64) -> f64 {
+        let mut out = [0.0];
+        table.at(t, &mut out);
+        out[0]
+    }
+
+    #[test]
+    fn a_sine_keeps_its_amplitude_between_rows() {
+        let v = |t: f64| -750.0 * (1.0 - (2.0 * PI * 25.0 * t).cos());
+        let command = sampled(200, 2e-3, v);
+        assert!(command.jumps().is_empty());
+        let table = command.table(&[]);
+        for i in 0..3900 {
+            let t = i as f64 * 1e-4;
+            // Straight lines between rows would be off by 9 V. Near the start the spline's end condition costs more.
+            let allowed = if t < 0.01 { 3.0 } else { 0.5 };
+            assert!((at(&table, t) - v(t)).abs() < allowed, "{t}: {} {}", at(&table, t), v(t));
+        }
+    }
+
+    #[test]
+    fn a_triangle_stays_straight_up_to_its_corners() {
+        let v = |t: f64| 975.0 * (1.0 - (t - 1.0).abs());
+        let command = sampled(101, 0.02, v);
+        assert!(command.jumps().is_empty());
+        let table = command.table(&[]);
+        for i in 0..2000 {
+            let t = i as f64 * 1e-3;
+            assert!((at(&table, t) - v(t)).abs() < 0.01, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_jump_takes_place_at_once_where_it_is_put() {
+        let command = sampled(20, 0.01, |t| if t < 0.095 { 0.0 } else { -900.0 });
+        assert_eq!(command.jumps(), [9]);
+        for share in [0.0, 0.3, 1.0] {
+            let table = command.table(&[share]);
+            let moment = 0.09 + 0.01 * share;
+            assert_eq!((at(&table, moment - 1e-5), at(&table, moment + 1e-5)), (0.0, -900.0), "{share}");
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Domains in the ceramic switch with memory, so the strain lags the voltage at any rate.
+//!
+//! ```text
+//! θ_V = −γ·ℓ·g·(V − h),    ḣ = A·V̇ − b·|V̇|·|h|^(n−1)·h − c·V̇·|h|^n,    h_max = (A/(b + c))^(1/n)          (Bouc-Wen)
+//!                        h = Σ w_i (V − p_i),    p_i ← max(V − r_i, min(V + r_i, p_i))                    (Prandtl-Ishlinskii)
+//! ```
+//!
+//! Both depend on the way of the voltage only, not on its rate. `width` is the opening of the loop as a share of a 1500 V stroke. Bouc-Wen: the
+//! opening is 2·h_max, so h_max = 750 V · width, and b, c follow from the asymmetry c/b. Prandtl-Ishlinskii (`plays = 1`): radii of 50, 150, ...,
+//! 1450 V with weights that fall as exp(−r/spread); their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its middle. The
+//! plays of a run have come from 0 V to its first voltage. g is 1 in the plain forms: which slope of a loop is called its gain is a convention.
+
+use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+
+/// See the file's head.
+pub const HYSTERESIS: Effect = Effect {
+    id: "hysteresis",
+    kind: Kind::Actuation,
+    cause: "Domains in the ceramic switch with memory, so the strain lags the voltage at any rate.",
+    equation: "θ_V = −γ·ℓ·g·(V − h),  ḣ = A·V̇ − b·|V̇|·|h|^(n−1)·h − c·V̇·|h|^n",
+    source: "Data sheet of the MFC actuator (width about 0.2); asymmetric loops: Fu et al., Sens. Actuators A 346 (2022) 113830.",
+    parameters: &[
+        Parameter {
+            name: "width",
+            unit: "",
+            bounds: [0.0, 0.6],
+            off: Some(0.0),
+            default: None,
+            about: "opening of the loop as a share of a 1500 V stroke",
+        },
+        Parameter {
+            name: "slope_loss",
+            unit: "",
+            bounds: [0.05, 1.0],
+            off: None,
+            default: Some(0.5),
+            about: "A: loss of gain at a turning point (Bouc-Wen)",
+        },
+        Parameter {
+            name: "asymmetry",
+            unit: "",
+            bounds: [-0.9, 1.0],
+            off: None,
+            default: Some(0.0),
+            about: "c/b (Bouc-Wen)",
+        },
+        Parameter { name: "exponent", unit: "", bounds: [1.0, 2.0], off: None, default: Some(1.0), about: "n (Bouc-Wen)" },
+        Parameter {
+            name: "plays",
+            unit: "",
+            bounds: [0.0, 1.0],
+            off: None,
+            default: Some(0.0),
+            about: "0: Bouc-Wen; 1: Prandtl-Ishlinskii, with width and spread_v",
+        },
+        Parameter {
+            name: "spread_v",
+            unit: "V",
+            bounds: [50.0, 1e5],
+            off: None,
+            default: Some(1000.0),
+            about: "radius over which the weights of the plays fall by e (Prandtl-Ishlinskii)",
+        },
+        Parameter { name: "gain", unit: "", bounds: [0.5, 2.0], off: None, default: Some(1.0), about: "g: slope that goes with the loop" },
+    ],
+    action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p[0], p[5], p[6], n)) }),
+};
+
+/// Stroke that the width is a share of (V).
+const STROKE: f64 = 1500.0;
+/// The state changes by at most this share of its limit in a substep.
+const LARGEST_PART: f64 = 0.05;
+
+struct BoucWen {
+    slope: f64,
+    /// b and c times h_max^n, so that the state is a share of h_max.
+    b: f64,
+    c: f64,
+    exponent: f64,
+    limit: f64,
+    gain: f64,
+    volts: Vec<f64>,
+    /// h/h_max.
+    state: Vec<f64>,
+}
+
+impl BoucWen {
+    fn new(p: &[f64], actuators: usize) -> Self {
+        let b = p[1] / (1.0 + p[2]);
+        let limit = 0.5 * STROKE * p[0] / p[6];
+        Self { slope: p[1], b, c: p[2] * b, exponent: p[3], limit, gain: p[6], volts: vec![0.0; actuators], state: vec![0.0; actuators] }
+    }
+
+    /// dh/dV at the share `h` for a voltage that changes in the direction `sign`.
+    fn rate(&self, h: f64, sign: f64) -> f64 {
+        let power = h.abs().powf(self.exponent);
+        self.slope - self.b * sign * power.copysign(h) - self.c * power
+    }
+}
+
+impl Voltages for BoucWen {
+    fn settle(&mut self, volts: &mut [f64]) {
+        self.volts.copy_from_slice(volts);
+        self.state.fill(0.0);
+        volts.iter_mut().for_each(|v| *v *= self.gain);
+    }
+
+    fn pass(&mut self, _dt: f64, volts: &mut [f64]) {
+        for (i, volts) in volts.iter_mut().enumerate() {
+            let change = (*volts - self.volts[i]) / self.limit;
+            self.volts[i] = *volts;
+            let parts = (change.abs() * self.slope / LARGEST_PART).ceil();
+            let (by, sign) = (change / parts, change.signum());
+            let mut h = self.state[i];
+            // Runge's midpoint rule: of second order, and the parts are small.
+            for _ in 0..parts as u64 {
+                let half = h + 0.5 * by * self.rate(h, sign);
+                h += by * self.rate(half, sign);
+            }
+            self.state[i] = h;
+            *volts = self.gain * (*volts - self.limit * h);
+        }
+    }
+
+    fn memory(&self) -> Vec<f64> {
+        [self.volts.as_slice(), &self.state].concat()
+    }
+
+    fn remember(&mut self, memory: &[f64]) {
+        let (volts, state) = memory.split_at(self.volts.len());
+        self.volts.copy_from_slice(volts);
+        self.state.copy_from_slice(state);
+    }
+}
+
+const RADII: usize = 15;
+
+fn radius(i: usize) -> f64 {
+    100.0 * i as f64 + 50.0
+}
+
+struct Plays {
+    weights: [f64; RADII],
+    gain: f64,
+    /// p_i of every actuator, one after the other.
+    plays: Vec<f64>,
+}
+
+impl Plays {
+    fn new(width: f64, spread: f64, gain: f64, actuators: usize) -> Self {
+        let falling: [f64; RADII] = std::array::from_fn(|i| (-radius(i) / spread).exp());
+        // Half way through a stroke of S between turning points, the branches of a play of radius r are min(2 r, S − 2 r) apart, or not at all.
+        let opening: f64 = falling.iter().enumerate().map(|(i, w)| w * (2.0 * radius(i)).min(STROKE - 2.0 * radius(i)).max(0.0)).sum();
+        let scale = width * STROKE / opening / gain;
+        Self { weights: falling.map(|w| scale * w), gain, plays: vec![0.0; RADII * actuators] }
+    }
+}
+
+impl Voltages for Plays {
+    /// All plays have come from 0 V.
+    fn settle(&mut self, volts: &mut [f64]) {
+        self.plays.fill(0.0);
+        self.pass(0.0, volts);
+    }
+
+    fn pass(&mut self, _dt: f64, volts: &mut [f64]) {
+        for (plays, volts) in self.plays.chunks_exact_mut(RADII).zip(volts) {
+            let mut h = 0.0;
+            for (i, (play, weight)) in plays.iter_mut().zip(&self.weights).enumerate() {
+                *play = play.max(*volts - radius(i)).min(*volts + radius(i));
+                h += weight * (*volts - *play);
+            }
+            *volts = self.gain * (*volts - h);
+        }
+    }
+
+    fn memory(&self) -> Vec<f64> {
+        self.plays.clone()
+    }
+
+    fn remember(&mut self, memory: &[f64]) {
+        self.plays.copy_from_slice(memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Opening of the loop between 0 and −1500 V at its middle (V), in steps of `step` volts.
+    fn opening(hysteresis: &mut dyn Voltages, step: f64) -> f64 {
+        let steps = (1500.0 / step) as usize;
+        hysteresis.settle(&mut [0.0]);
+        let mut middle = [0.0; 2];
+        for _ in 0..3 {
+            for (branch, middle) in middle.iter_mut().enumerate() {
+                for k in 1..=steps {
+                    let volts = step * k as f64;
+                    let mut out = [if branch == 0 { -volts } else { volts - 1500.0 }];
+                    hysteresis.pass(1.0, &mut out);
+                    if 2 * k == steps {
+                        *middle = out[0];
+                    }
+                }
+            }
+        }
+        middle[0] - middle[1]
+    }
+
+    #[test]
+    fn the_loop_opens_as_wide_as_asked_at_any_rate() {
+        for step in [1.0, 15.0] {
+            // With a steep slope the Bouc-Wen state is at its limit half way.
+            let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3], 1), step);
+            assert!((bouc_wen / 150.0 - 1.0).abs() < 1e-3, "{bouc_wen}");
+        }
+        let plays = opening(&mut Plays::new(0.1, 800.0, 1.3, 1), 15.0);
+        assert!((plays / 150.0 - 1.0).abs() < 1e-9, "{plays}");
+    }
+
+    #[test]
+    fn a_minor_loop_closes() {
+        let mut plays = Plays::new(0.2, 800.0, 1.0, 1);
+        plays.settle(&mut [0.0]);
+        let mut at = |volts: f64| {
+            let mut out = [volts];
+            plays.pass(1.0, &mut out);
+            out[0]
+        };
+        at(-1500.0);
+        let before = at(-600.0);
+        at(-900.0);
+        assert!((at(-600.0) - before).abs() < 1e-9);
+    }
+}

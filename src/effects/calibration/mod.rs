@@ -1,0 +1,11 @@
+//! Constants of the nominal model that are off by a factor.
+
+mod actuation_gain;
+mod areal_mass;
+mod damping;
+mod stiffness;
+
+pub use actuation_gain::ACTUATION_GAIN;
+pub use areal_mass::AREAL_MASS;
+pub use damping::DAMPING;
+pub use stiffness::STIFFNESS;

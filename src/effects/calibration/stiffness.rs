@@ -1,0 +1,18 @@
+//! Moduli, thickness or bond differ from nominal, so every joint is stiffer or softer by one factor.
+//!
+//! ```text
+//! τ = −s·k·(θ − θ_V + η·θ̇)
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter};
+
+/// See the file's head.
+pub const STIFFNESS: Effect = Effect {
+    id: "stiffness",
+    kind: Kind::Calibration,
+    cause: "Moduli, thickness or bond differ from nominal, so every joint is stiffer or softer by one factor.",
+    equation: "τ = −s·k·(θ − θ_V + η·θ̇)",
+    source: "Derived from eq. 1; spread of MFC parameters: Hu, Smith, Hays, Oates, CDC-ECC 2011.",
+    parameters: &[Parameter { name: "scale", unit: "", bounds: [0.5, 2.0], off: Some(1.0), default: None, about: "factor s on the stiffness k" }],
+    action: Action::Robot(|p, robot| robot.extensions.stiffness_scale *= p[0]),
+};

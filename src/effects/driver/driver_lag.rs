@@ -1,0 +1,64 @@
+//! The source's resistance charges the actuator's capacitance.
+//!
+//! ```text
+//! T·dV_a/dt + V_a = V_c,  T = R·C
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+
+/// See the file's head.
+pub const DRIVER_LAG: Effect = Effect {
+    id: "driver-lag",
+    kind: Kind::Driver,
+    cause: "The source's resistance charges the actuator's capacitance.",
+    equation: "T·dV_a/dt + V_a = V_c,  T = R·C",
+    source: "Capacitance per area: data sheet of the MFC actuator; derived.",
+    parameters: &[Parameter { name: "time_constant_s", unit: "s", bounds: [0.0, 0.2], off: Some(0.0), default: None, about: "time constant T" }],
+    action: Action::Voltages(|p, n, _| Box::new(Lag { time: p[0], volts: vec![0.0; n] })),
+};
+
+/// The state is the voltage at the end of the last step; exact for voltages that are constant over a step.
+struct Lag {
+    time: f64,
+    volts: Vec<f64>,
+}
+
+impl Voltages for Lag {
+    fn settle(&mut self, volts: &mut [f64]) {
+        self.volts.copy_from_slice(volts);
+    }
+
+    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+        let steps = dt / self.time;
+        // 1 − exp(−dt/T), and its mean over the step.
+        let gone = -(-steps).exp_m1();
+        let mean = gone / steps;
+        for (now, volts) in self.volts.iter_mut().zip(volts) {
+            let away = *now - *volts;
+            *now = *volts + away * (1.0 - gone);
+            *volts += away * mean;
+        }
+    }
+
+    fn memory(&self) -> Vec<f64> {
+        self.volts.clone()
+    }
+
+    fn remember(&mut self, memory: &[f64]) {
+        self.volts.copy_from_slice(memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_response_is_the_exponential() {
+        let mut lag = Lag { time: 0.01, volts: vec![0.0] };
+        for _ in 0..25 {
+            lag.pass(1e-3, &mut [100.0]);
+        }
+        assert!((lag.volts[0] - 100.0 * (1.0 - (-2.5_f64).exp())).abs() < 1e-12);
+    }
+}

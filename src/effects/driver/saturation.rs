@@ -1,0 +1,36 @@
+//! The amplifier or a protection limits the level of the voltage.
+//!
+//! ```text
+//! V_a = min(V_hi, max(V_lo, V_c))
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+
+/// See the file's head.
+pub const SATURATION: Effect = Effect {
+    id: "saturation",
+    kind: Kind::Driver,
+    cause: "The amplifier or a protection limits the level of the voltage.",
+    equation: "V_a = min(V_hi, max(V_lo, V_c))",
+    source: "Limits of the MFC actuator: data sheet, Smart Material Corp.",
+    parameters: &[
+        Parameter { name: "max_v", unit: "V", bounds: [0.0, 5000.0], off: Some(f64::INFINITY), default: Some(f64::INFINITY), about: "largest voltage V_hi" },
+        Parameter { name: "min_v", unit: "V", bounds: [-5000.0, 0.0], off: Some(f64::NEG_INFINITY), default: Some(f64::NEG_INFINITY), about: "least voltage V_lo" },
+    ],
+    action: Action::Voltages(|p, _, _| Box::new(Limits { max: p[0], min: p[1] })),
+};
+
+struct Limits {
+    max: f64,
+    min: f64,
+}
+
+impl Voltages for Limits {
+    fn settle(&mut self, volts: &mut [f64]) {
+        volts.iter_mut().for_each(|v| *v = v.max(self.min).min(self.max));
+    }
+
+    fn pass(&mut self, _dt: f64, volts: &mut [f64]) {
+        self.settle(volts);
+    }
+}

@@ -1,0 +1,69 @@
+//! The amplifier's current limit bounds the rate of voltage.
+//!
+//! ```text
+//! |dV_a/dt| ≤ S, otherwise V_a = V_c
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+
+/// See the file's head.
+pub const SLEW_LIMIT: Effect = Effect {
+    id: "slew-limit",
+    kind: Kind::Driver,
+    cause: "The amplifier's current limit bounds the rate of voltage.",
+    equation: "|dV_a/dt| ≤ S, otherwise V_a = V_c",
+    source: "Derived: S = I_max/C.",
+    parameters: &[Parameter { name: "rate_v_per_s", unit: "V/s", bounds: [100.0, 1e9], off: Some(f64::INFINITY), default: None, about: "largest rate S" }],
+    action: Action::Voltages(|p, n, _| Box::new(Slew { rate: p[0], volts: vec![0.0; n] })),
+};
+
+/// Follows at a limited rate. The state is the voltage at the end of the last step.
+struct Slew {
+    rate: f64,
+    volts: Vec<f64>,
+}
+
+impl Voltages for Slew {
+    fn settle(&mut self, volts: &mut [f64]) {
+        self.volts.copy_from_slice(volts);
+    }
+
+    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+        let most = self.rate * dt;
+        for (now, volts) in self.volts.iter_mut().zip(volts) {
+            let change = *volts - *now;
+            // A step at the limit ramps; one that arrives within the step holds from there on.
+            let ramp = change.abs().min(most);
+            let mean = if most > 0.0 { ramp * (1.0 - 0.5 * ramp / most) } else { 0.0 };
+            let from = *now;
+            *now += ramp.copysign(change);
+            *volts = from + mean.copysign(change);
+        }
+    }
+
+    fn memory(&self) -> Vec<f64> {
+        self.volts.clone()
+    }
+
+    fn remember(&mut self, memory: &[f64]) {
+        self.volts.copy_from_slice(memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_becomes_a_ramp_of_the_limiting_rate() {
+        let mut slew = Slew { rate: 1e4, volts: vec![0.0] };
+        let mut sum = 0.0;
+        for _ in 0..200 {
+            let mut volts = [-1000.0];
+            slew.pass(1e-3, &mut volts);
+            sum += 1e-3 * volts[0];
+        }
+        // 0.1 s of ramp is behind by 0.05 s in the mean.
+        assert!((sum + 1000.0 * (0.2 - 0.05)).abs() < 1e-9, "{sum}");
+    }
+}

@@ -1,0 +1,18 @@
+//! Processing or transport delays the voltage.
+//!
+//! ```text
+//! V_a(t) = V_c(t − T)
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter};
+
+/// See the file's head.
+pub const TIME_DELAY: Effect = Effect {
+    id: "time-delay",
+    kind: Kind::Driver,
+    cause: "Processing or transport delays the voltage.",
+    equation: "V_a(t) = V_c(t − T)",
+    source: "Derived.",
+    parameters: &[Parameter { name: "delay_s", unit: "s", bounds: [0.0, 0.1], off: Some(0.0), default: None, about: "delay T" }],
+    action: Action::Drive(|p, drive| drive.delay += p[0]),
+};

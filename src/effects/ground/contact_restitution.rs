@@ -1,0 +1,18 @@
+//! The contact returns part of the energy of an impact.
+//!
+//! ```text
+//! v⁺ = −e·v⁻, from 0.2 cm/s on
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter};
+
+/// See the file's head.
+pub const CONTACT_RESTITUTION: Effect = Effect {
+    id: "contact-restitution",
+    kind: Kind::Ground,
+    cause: "The contact returns part of the energy of an impact.",
+    equation: "v⁺ = −e·v⁻, from 0.2 cm/s on",
+    source: "Newton's law of impact; the threshold is Bullet's.",
+    parameters: &[Parameter { name: "restitution", unit: "", bounds: [0.0, 0.9], off: Some(0.0), default: None, about: "share e of the approach speed that is returned" }],
+    action: Action::Robot(|p, robot| robot.extensions.restitution = p[0]),
+};

@@ -1,0 +1,11 @@
+//! Between robot and floor.
+
+mod contact_restitution;
+mod ground_friction;
+mod ground_slope;
+mod stick_slip;
+
+pub use contact_restitution::CONTACT_RESTITUTION;
+pub use ground_friction::GROUND_FRICTION;
+pub use ground_slope::GROUND_SLOPE;
+pub use stick_slip::STICK_SLIP;

@@ -1,0 +1,18 @@
+//! The camera is rolled about its axis.
+//!
+//! ```text
+//! x_m = x·cos ψ − z·sin ψ,  z_m = x·sin ψ + z·cos ψ
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter};
+
+/// See the file's head.
+pub const CAMERA_TILT: Effect = Effect {
+    id: "camera-tilt",
+    kind: Kind::Measurement,
+    cause: "The camera is rolled about its axis.",
+    equation: "x_m = x·cos ψ − z·sin ψ,  z_m = x·sin ψ + z·cos ψ",
+    source: "Derived.",
+    parameters: &[Parameter { name: "angle_deg", unit: "°", bounds: [-30.0, 30.0], off: Some(0.0), default: None, about: "roll ψ" }],
+    action: Action::View(|p, view| view.tilt += p[0].to_radians()),
+};

@@ -1,0 +1,18 @@
+//! Exposure, transfer or a filter delays the record.
+//!
+//! ```text
+//! y_m(t) = y(t − T)
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter};
+
+/// See the file's head.
+pub const SENSOR_DELAY: Effect = Effect {
+    id: "sensor-delay",
+    kind: Kind::Measurement,
+    cause: "Exposure, transfer or a filter delays the record.",
+    equation: "y_m(t) = y(t − T)",
+    source: "Derived.",
+    parameters: &[Parameter { name: "delay_s", unit: "s", bounds: [0.0, 0.1], off: Some(0.0), default: None, about: "delay T" }],
+    action: Action::View(|p, view| view.delay += p[0]),
+};

@@ -1,0 +1,18 @@
+//! Wrong pixels per millimetre, perspective, or gain.
+//!
+//! ```text
+//! y_m = s·y
+//! ```
+
+use crate::effects::{Action, Effect, Kind, Parameter};
+
+/// See the file's head.
+pub const SENSOR_SCALE: Effect = Effect {
+    id: "sensor-scale",
+    kind: Kind::Measurement,
+    cause: "Wrong pixels per millimetre, perspective, or gain.",
+    equation: "y_m = s·y",
+    source: "From general knowledge.",
+    parameters: &[Parameter { name: "scale", unit: "", bounds: [0.5, 2.0], off: Some(1.0), default: None, about: "factor s on positions" }],
+    action: Action::View(|p, view| view.scale *= p[0]),
+};

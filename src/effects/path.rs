@@ -1,0 +1,71 @@
+//! The way of the voltages from command to actuator.
+
+use super::{Action, Applied, EFFECTS};
+
+/// Passes on the voltages of all actuators, step by step, with whatever memory that takes.
+pub trait Voltages: Send {
+    /// Comes to rest at constant `volts` (V), one per actuator, and turns them into what comes out.
+    fn settle(&mut self, volts: &mut [f64]);
+
+    /// Turns the mean voltages of a step of `dt` (s) into what comes out.
+    fn pass(&mut self, dt: f64, volts: &mut [f64]);
+
+    /// Its memory, as numbers for storing.
+    fn memory(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Takes up a memory of the same length.
+    fn remember(&mut self, _memory: &[f64]) {}
+}
+
+/// All voltage effects of a run, in the order in which they act.
+pub struct Path {
+    stages: Vec<Box<dyn Voltages>>,
+}
+
+impl Path {
+    /// The way through `effects` for a robot of `actuators` actuators in a run of `duration` (s).
+    pub fn new(effects: &[Applied], actuators: usize, duration: f64) -> Self {
+        let of = |id: &str| effects.iter().filter(move |applied| applied.effect.id == id && !applied.is_off()).collect::<Vec<_>>();
+        let stages = EFFECTS.iter().flat_map(|effect| of(effect.id)).filter_map(|applied| match applied.effect.action {
+            Action::Voltages(make) => Some(make(&applied.values, actuators, duration)),
+            _ => None,
+        });
+        Self { stages: stages.collect() }
+    }
+
+    /// Whether nothing stands in the way.
+    pub fn is_empty(&self) -> bool {
+        self.stages.is_empty()
+    }
+
+    /// Comes to rest at `volts`, which become what comes out.
+    pub fn settle(&mut self, volts: &mut [f64]) {
+        self.stages.iter_mut().for_each(|stage| stage.settle(volts));
+    }
+
+    /// Passes on a step's mean voltages.
+    pub fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+        self.stages.iter_mut().for_each(|stage| stage.pass(dt, volts));
+    }
+
+    /// All memory, as numbers for storing.
+    pub fn save(&self) -> Vec<f64> {
+        self.stages.iter().flat_map(|stage| stage.memory()).collect()
+    }
+
+    /// How many numbers that are.
+    pub fn len(&self) -> usize {
+        self.stages.iter().map(|stage| stage.memory().len()).sum()
+    }
+
+    /// Takes that many numbers up again.
+    pub fn load(&mut self, mut saved: &[f64]) {
+        for stage in &mut self.stages {
+            let (own, rest) = saved.split_at(stage.memory().len());
+            stage.remember(own);
+            saved = rest;
+        }
+    }
+}

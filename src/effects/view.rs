@@ -1,0 +1,49 @@
+//! What a camera makes of positions.
+
+/// How positions are seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Factor on positions (–).
+    pub scale: f64,
+    /// Added to x and z (cm).
+    pub offset: [f64; 2],
+    /// Roll of the camera (rad).
+    pub tilt: f64,
+    /// How late positions are seen (s).
+    pub delay: f64,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { scale: 1.0, offset: [0.0; 2], tilt: 0.0, delay: 0.0 }
+    }
+}
+
+impl View {
+    /// The view through `effects`.
+    pub fn new(effects: &[super::Applied]) -> Self {
+        let mut view = Self::default();
+        for applied in effects.iter().filter(|applied| !applied.is_off()) {
+            if let super::Action::View(change) = applied.effect.action {
+                change(&applied.values, &mut view);
+            }
+        }
+        view
+    }
+
+    /// Whether positions are seen as they are.
+    pub fn is_plain(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Where a point at x, z (cm) is seen: rolled, scaled, then shifted.
+    pub fn of(&self, [x, z]: [f64; 2]) -> [f64; 2] {
+        let [x, z] = if self.tilt == 0.0 {
+            [x, z]
+        } else {
+            let (sin, cos) = self.tilt.sin_cos();
+            [x * cos - z * sin, x * sin + z * cos]
+        };
+        [self.scale * x + self.offset[0], self.scale * z + self.offset[1]]
+    }
+}

@@ -1,0 +1,83 @@
+//! An engine whose voltages pass effects on their way to the actuators.
+
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
+use crate::effects::Path;
+
+/// Any engine behind a [`Path`].
+pub struct AffectedEngine {
+    engine: Box<dyn Engine>,
+    path: Path,
+    time_step: f64,
+    voltages: Vec<f64>,
+}
+
+impl AffectedEngine {
+    /// `engine`, which steps by `time_step` (s), behind a `path` that has come to rest at the first voltages.
+    pub fn new(engine: Box<dyn Engine>, path: Path, time_step: f64) -> Self {
+        Self { engine, path, time_step, voltages: Vec::new() }
+    }
+}
+
+impl Engine for AffectedEngine {
+    /// The voltages pass once for every step, so this may be called once before every [`advance`](Engine::advance).
+    fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        self.voltages.clear();
+        self.voltages.extend_from_slice(voltages);
+        self.path.pass(self.time_step, &mut self.voltages);
+        self.engine.prepare(&self.voltages)
+    }
+
+    fn joints(&self) -> &JointState {
+        self.engine.joints()
+    }
+
+    fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
+        self.engine.nodes(positions, velocities)
+    }
+
+    fn base(&mut self) -> Result<PlanarBase, EngineError> {
+        self.engine.base()
+    }
+
+    fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
+        self.engine.contacts(contacts)
+    }
+
+    fn advance(&mut self) -> Result<(), EngineError> {
+        self.engine.advance()
+    }
+
+    fn numerical_loss(&self) -> f64 {
+        self.engine.numerical_loss()
+    }
+
+    /// The path's memory, then the engine's state.
+    fn save(&self) -> Result<Vec<f64>, EngineError> {
+        let mut state = self.path.save();
+        state.extend(self.engine.save()?);
+        Ok(state)
+    }
+
+    fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
+        let (memory, rest) = state.split_at_checked(self.path.len()).ok_or(EngineError::State)?;
+        self.engine.load(step, rest)?;
+        self.path.load(memory);
+        Ok(())
+    }
+
+    fn midpoint(&self) -> bool {
+        self.engine.midpoint()
+    }
+
+    fn kinetic_energy(&self) -> Option<f64> {
+        self.engine.kinetic_energy()
+    }
+
+    fn step(&self) -> u64 {
+        self.engine.step()
+    }
+
+    fn clamp_hits(&self) -> Option<ClampHits> {
+        self.engine.clamp_hits()
+    }
+}

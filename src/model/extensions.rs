@@ -1,0 +1,118 @@
+//! What a robot has beyond the plain model. Everything is off by default, and off costs nothing and changes no bit.
+
+/// Additions to the plain robot that both engines know how to step. [`crate::effects`] sets them; the fields are in CGS units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extensions {
+    /// Factor on every joint's stiffness (–).
+    pub stiffness_scale: f64,
+    /// Factor on the curvature per volt (–).
+    pub gain_scale: f64,
+    /// Factor on the damping time η (–).
+    pub damping_scale: f64,
+    /// Factor on every body's mass (–).
+    pub mass_scale: f64,
+    /// Factor on the robot's coefficients of friction (–).
+    pub friction_scale: f64,
+    /// Turn of a clamped root per moment on it (rad/(dyn·cm)).
+    pub clamp_compliance: f64,
+    /// Masses fixed to the sheet.
+    pub point_masses: Vec<PointMass>,
+    /// Curvature at 0 V (1/cm), one per actuator, or none.
+    pub rest_curvature: Vec<f64>,
+    /// Factor on each joint's voltage (–), or none.
+    pub joint_gains: Vec<f64>,
+    /// a of `k δ (1 − a (δ/ℓ)²)` (cm²).
+    pub softening: f64,
+    /// Moment of dry friction in every joint (dyn·cm).
+    pub dry_friction: f64,
+    /// ξ: stiffness added per decade of the loss ladder, as a share of a joint's (–).
+    pub loss: f64,
+    /// Drag coefficient of the sheet in air (–).
+    pub drag: f64,
+    /// Slope of the floor (rad), positive if it rises along +x.
+    pub slope: f64,
+    /// Share of the approach speed that contact returns (–).
+    pub restitution: f64,
+    /// How friction depends on the sliding speed.
+    pub stick_slip: StickSlip,
+}
+
+/// A mass at a point of the sheet's centre line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointMass {
+    /// Mass (g).
+    pub mass: f64,
+    /// Distance from the left end along the sheet (cm).
+    pub position: f64,
+}
+
+/// Friction that falls from its static to its sliding value: `μ (1 + (ratio − 1) exp(−(v/speed)²))`, and a viscous part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StickSlip {
+    /// Static over sliding friction (–).
+    pub ratio: f64,
+    /// Speed at which the difference has fallen to 1/e (cm/s).
+    pub speed: f64,
+    /// Force per sliding speed and link in contact (dyn·s/cm).
+    pub viscous: f64,
+}
+
+impl StickSlip {
+    /// No dependence on speed.
+    pub const OFF: Self = Self { ratio: 1.0, speed: 1.0, viscous: 0.0 };
+
+    /// The coefficient of friction at the sliding speed `v` (cm/s) under the normal force `normal` (dyn), from the plain one.
+    pub fn friction(&self, plain: f64, v: f64, normal: f64) -> f64 {
+        let v = v.abs();
+        let dry = plain * (1.0 + (self.ratio - 1.0) * (-(v / self.speed).powi(2)).exp());
+        if normal > 0.0 { dry + self.viscous * v / normal } else { dry }
+    }
+}
+
+impl Default for Extensions {
+    fn default() -> Self {
+        Self {
+            stiffness_scale: 1.0,
+            gain_scale: 1.0,
+            damping_scale: 1.0,
+            mass_scale: 1.0,
+            friction_scale: 1.0,
+            clamp_compliance: 0.0,
+            point_masses: Vec::new(),
+            rest_curvature: Vec::new(),
+            joint_gains: Vec::new(),
+            softening: 0.0,
+            dry_friction: 0.0,
+            loss: 0.0,
+            drag: 0.0,
+            slope: 0.0,
+            restitution: 0.0,
+            stick_slip: StickSlip::OFF,
+        }
+    }
+}
+
+/// Rate at which dry friction has 76 % of its moment (rad/s): `τ_c tanh(θ̇/ω)`.
+pub const DRY_FRICTION_RATE: f64 = 0.03;
+/// Softening leaves at least this share of a joint's stiffness.
+pub const LEAST_STIFFNESS: f64 = 0.5;
+/// Time constants (s) of the loss ladder: a loss factor of about 0.68 ξ that is flat from 0.05 to 100 Hz.
+pub const LOSS_TIMES: [f64; 5] = [1e-3, 1e-2, 1e-1, 1.0, 10.0];
+/// Density of air (g/cm³).
+pub const AIR_DENSITY: f64 = 1.2e-3;
+
+impl Extensions {
+    /// Whether the joints' torque law has terms beyond eq. 1.
+    pub fn bends_torque_law(&self) -> bool {
+        self.softening != 0.0 || self.dry_friction != 0.0 || self.loss != 0.0
+    }
+
+    /// Torque of a joint beyond eq. 1 (dyn·cm) at the elastic angle `delta` (rad) and the rate (rad/s), for a joint of stiffness `k`
+    /// (dyn·cm/rad) that stands for the length `link` (cm): softening and dry friction.
+    pub fn torque(&self, k: f64, link: f64, delta: f64, rate: f64) -> f64 {
+        let strain = self.softening * (delta / link).powi(2);
+        let softened = k * delta * strain.min(1.0 - LEAST_STIFFNESS);
+        let friction = if self.dry_friction == 0.0 { 0.0 } else { self.dry_friction * (rate / DRY_FRICTION_RATE).tanh() };
+        softened - friction
+    }
+}
