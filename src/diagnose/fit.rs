@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::plant::{Plant, Term};
+use super::plant::{Model, Plant};
 
 /// Step of finite differences as a share of a parameter's scale.
 const DIFFERENCE: f64 = 0.02;
@@ -18,14 +18,19 @@ const DIFFERENCE: f64 = 0.02;
 const ENOUGH: f64 = 1e-6;
 const ENOUGH_OF_ITSELF: f64 = 1e-4;
 const MOST_ROUNDS: usize = 25;
+/// Values in a block that structure of the residuals may extend over.
+const BLOCK: usize = 50;
+/// The same where models are only to be ranked.
+const ENOUGH_TO_RANK: f64 = 2e-2;
+const MOST_ROUNDS_TO_RANK: usize = 8;
 
-/// A model: its terms and the discretisation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Model {
-    /// Causes beside the nominal model.
-    pub terms: Vec<Term>,
-    /// As in [`Plant::resolutions`].
-    pub resolution: f64,
+/// How far a fit is carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Care {
+    /// Far enough to see whether a model is worth more.
+    Rank,
+    /// To the end.
+    Full,
 }
 
 /// Unknowns of all runs.
@@ -50,6 +55,8 @@ pub struct Bench<'a> {
     pub plant: &'a dyn Plant,
     /// Moments of jumps and the like, as they are taken at present.
     pub unknowns: Unknowns,
+    /// Which values of each run count.
+    pub used: Vec<Vec<bool>>,
 }
 
 /// Residuals of one run in standard deviations.
@@ -59,7 +66,8 @@ impl<'a> Bench<'a> {
     /// A plant with its unknowns at the ends of their intervals: a command is held until the row that shows its change.
     pub fn new(plant: &'a dyn Plant) -> Self {
         let unknowns = (0..plant.signals().len()).map(|run| vec![1.0; plant.unknowns(run)]).collect();
-        Self { plant, unknowns }
+        let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
+        Self { plant, unknowns, used }
     }
 
     /// Residuals of a run.
@@ -69,9 +77,9 @@ impl<'a> Bench<'a> {
 
     fn residuals_with(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Residuals, String> {
         let signal = &self.plant.signals()[run];
-        let predicted = self.plant.predict(&model.terms, model.resolution, run, unknowns)?;
-        let each = signal.values.iter().zip(&predicted).zip(&signal.sigmas);
-        Ok(each.map(|((y, f), sigma)| (y - f) / sigma).collect())
+        let predicted = self.plant.predict(model, run, unknowns)?;
+        let each = signal.values.iter().zip(&predicted).zip(&signal.sigmas).zip(&self.used[run]);
+        Ok(each.map(|(((y, f), sigma), used)| if *used { (y - f) / sigma } else { 0.0 }).collect())
     }
 
     /// Residuals of several runs.
@@ -86,7 +94,7 @@ impl<'a> Bench<'a> {
 
     /// Number of values in runs.
     pub fn count(&self, runs: &[usize]) -> usize {
-        runs.iter().map(|run| self.plant.signals()[*run].values.len()).sum()
+        runs.iter().map(|run| self.used[*run].iter().filter(|used| **used).count()).sum()
     }
 
     /// The coordinate's step for a finite difference: away from the nearer bound.
@@ -129,7 +137,16 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// If the start cannot be simulated.
-    pub fn fit(&self, start: &Model, runs: &[usize]) -> Result<Fit, String> {
+    pub fn fit(&self, start: &Model, runs: &[usize], care: Care) -> Result<Fit, String> {
+        self.fit_held(start, runs, care, None)
+    }
+
+    /// The same with one coordinate held.
+    fn fit_held(&self, start: &Model, runs: &[usize], care: Care, fixed: Option<(usize, usize)>) -> Result<Fit, String> {
+        let (enough, most) = match care {
+            Care::Rank => (ENOUGH_TO_RANK, MOST_ROUNDS_TO_RANK),
+            Care::Full => (ENOUGH_OF_ITSELF, MOST_ROUNDS),
+        };
         let mut model = start.clone();
         let places = places(&model);
         let count = self.count(runs);
@@ -138,7 +155,7 @@ impl<'a> Bench<'a> {
         let mut chi2 = f64::INFINITY;
         let mut information = DMatrix::zeros(n, n);
         let mut rounds = 0;
-        'rounds: while rounds < MOST_ROUNDS {
+        'rounds: while rounds < most {
             rounds += 1;
             let (residuals, derivatives) = self.linearised(&model, runs)?;
             chi2 = residuals.iter().map(|r| square(r)).sum();
@@ -153,7 +170,10 @@ impl<'a> Bench<'a> {
                 let bounds = |k: usize| self.plant.candidates()[model.terms[places[k].0].candidate].parameters[places[k].1].bounds;
                 let x = |k: usize| model.terms[places[k].0].x[places[k].1];
                 let held: Vec<bool> = (0..n)
-                    .map(|k| (x(k) <= bounds(k)[0] && gradient[k] > 0.0) || (x(k) >= bounds(k)[1] && gradient[k] < 0.0))
+                    .map(|k| {
+                        let [low, high] = bounds(k);
+                        Some(places[k]) == fixed || (x(k) <= low && gradient[k] > 0.0) || (x(k) >= high && gradient[k] < 0.0)
+                    })
                     .collect();
                 let mut matrix = information.clone();
                 let mut right = -gradient.clone();
@@ -181,7 +201,7 @@ impl<'a> Bench<'a> {
                     model = trial;
                     chi2 = found;
                     lambda = (lambda * 0.1).max(1e-9);
-                    if gain < ENOUGH * count as f64 || gain < ENOUGH_OF_ITSELF * (found - count as f64).max(0.0).max(ENOUGH * count as f64) {
+                    if gain < ENOUGH * count as f64 || gain < enough * (found - count as f64).max(0.0).max(ENOUGH * count as f64) {
                         break 'rounds;
                     }
                     break;
@@ -193,6 +213,68 @@ impl<'a> Bench<'a> {
             }
         }
         Ok(Fit { model, chi2, count, information })
+    }
+
+    /// χ² of a model with one coordinate put to a value and all others fitted again.
+    ///
+    /// # Errors
+    /// If it cannot be simulated.
+    pub fn profile(&self, model: &Model, (term, parameter): (usize, usize), to: f64, runs: &[usize]) -> Result<f64, String> {
+        let mut model = model.clone();
+        model.terms[term].x[parameter] = to;
+        Ok(self.fit_held(&model, runs, Care::Full, Some((term, parameter)))?.chi2)
+    }
+
+    /// How much larger than for independent noise the variance of each coordinate is, from the residuals as they are: with blocks b of [`BLOCK`]
+    /// values, C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against C = (JᵀJ)⁻¹; at least 1, and at least χ² per value.
+    ///
+    /// # Errors
+    /// If the model cannot be simulated.
+    pub fn inflation(&self, model: &Model, runs: &[usize], covariance: &DMatrix<f64>) -> Result<Vec<f64>, String> {
+        let (residuals, derivatives) = self.linearised(model, runs)?;
+        let n = derivatives.len();
+        let mut meat = DMatrix::zeros(n, n);
+        for run in 0..runs.len() {
+            let values = residuals[run].len();
+            for from in (0..values).step_by(BLOCK) {
+                let to = (from + BLOCK).min(values);
+                let score = DVector::from_fn(n, |k, _| (from..to).map(|i| derivatives[k][run][i] * residuals[run][i]).sum::<f64>());
+                meat += &score * score.transpose();
+            }
+        }
+        let count = self.count(runs).max(1) as f64;
+        let least = (residuals.iter().map(|r| square(r)).sum::<f64>() / count).max(1.0);
+        let sandwich = covariance * meat * covariance;
+        Ok((0..n)
+            .map(|k| {
+                let ratio = sandwich[(k, k)] / covariance[(k, k)];
+                if ratio.is_finite() { ratio.max(least) } else { least }
+            })
+            .collect())
+    }
+
+    /// Leaves out values whose residuals stand far above those around them in their channel: what a tracker lost for a row or two. Returns how many.
+    pub fn leave_out_spikes(&mut self, model: &Model) -> Result<usize, String> {
+        const FAR: f64 = 6.0;
+        const AROUND: usize = 8;
+        let mut count = 0;
+        for run in 0..self.used.len() {
+            let residuals = self.residuals(model, run)?;
+            let channels = &self.plant.signals()[run].channels;
+            for at in 0..residuals.len() {
+                let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(residuals.len());
+                let mut around: Vec<f64> =
+                    near.filter(|k| *k != at && channels[*k] == channels[at] && self.used[run][*k]).map(|k| residuals[k].abs()).collect();
+                around.sort_by(f64::total_cmp);
+                // Beyond what three quarters of the neighbours show, so that a true jump or peak stays.
+                let usual = around.get(3 * around.len() / 4).copied().unwrap_or(f64::INFINITY);
+                if self.used[run][at] && residuals[at].abs() > FAR + 3.0 * usual {
+                    self.used[run][at] = false;
+                    count += 1;
+                }
+            }
+        }
+        Ok(count)
     }
 
     /// Fits what belongs to each run on its own, for a model as it is.

@@ -5,4 +5,7 @@ pub mod fit;
 pub mod plant;
 pub mod quality;
 pub mod robot;
+pub mod search;
+pub mod tests;
+pub mod verdict;
 pub mod voltage;

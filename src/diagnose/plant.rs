@@ -54,6 +54,17 @@ pub struct Term {
     pub x: Vec<f64>,
 }
 
+/// A model: the nominal one with causes added, and its discretisation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Causes beside the nominal model.
+    pub terms: Vec<Term>,
+    /// As in [`Plant::resolutions`].
+    pub resolution: f64,
+    /// Whether numbers are to be trusted to the last: half the time step.
+    pub fine: bool,
+}
+
 /// One run as measured, without what is missing or was found to be damaged.
 #[derive(Debug, Clone)]
 pub struct Signal {
@@ -95,9 +106,14 @@ pub trait Plant: Sync {
         0
     }
 
-    /// The signal of `run` as predicted by the nominal model with `terms`, at the times and channels of the measured one.
+    /// Whether a cause does more than what the discretisation leaves open.
+    fn is_credible(&self, _term: &Term, _resolution: f64) -> bool {
+        true
+    }
+
+    /// The signal of `run` as predicted by `model`, at the times and channels of the measured one.
     ///
     /// # Errors
     /// Why it cannot be predicted, in words.
-    fn predict(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64]) -> Result<Vec<f64>, String>;
+    fn predict(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Vec<f64>, String>;
 }

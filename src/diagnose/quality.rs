@@ -122,7 +122,10 @@ fn remove_outliers(times: &[f64], y: &[f64], good: &mut [bool], noise: f64) -> u
         let like = |k: usize, share: f64| (size(k) / size(i) - share).abs() < 0.3;
         let alone = like(i - 1, -2.0 / 3.0) && like(i + 1, -2.0 / 3.0) && like(i - 2, 1.0 / 6.0) && like(i + 2, 1.0 / 6.0);
         let bridge = (4.0 * (work[i - 1] + work[i + 1]) - work[i - 2] - work[i + 2]) / 6.0;
-        if alone && good[i] {
+        // Where the motion itself is too fast for the rows, differences are large all around.
+        let around: Vec<f64> = (3..9).flat_map(|k| [i.checked_sub(k), Some(i + k)]).flatten().map(|k| size(k).abs()).collect();
+        let quiet = median(around).is_none_or(|around| size(i).abs() > 4.0 * around);
+        if alone && quiet && good[i] {
             good[i] = false;
             count += 1;
         }

@@ -96,8 +96,8 @@ impl Default for Extensions {
 pub const DRY_FRICTION_RATE: f64 = 0.03;
 /// Softening leaves at least this share of a joint's stiffness.
 pub const LEAST_STIFFNESS: f64 = 0.5;
-/// Time constants (s) of the loss ladder: a loss factor of about 0.68 ξ that is flat from 0.05 to 100 Hz.
-pub const LOSS_TIMES: [f64; 5] = [1e-3, 1e-2, 1e-1, 1.0, 10.0];
+/// Time constants (s) of the loss ladder: a loss factor of about 0.68 ξ that is flat from 0.3 to 500 Hz.
+pub const LOSS_TIMES: [f64; 5] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 /// Density of air (g/cm³).
 pub const AIR_DENSITY: f64 = 1.2e-3;
 

@@ -6,9 +6,9 @@
 //! ```
 //!
 //! Both depend on the way of the voltage only, not on its rate. `width` is the opening of the loop as a share of a 1500 V stroke. Bouc-Wen: the
-//! opening is 2·h_max, so h_max = 750 V · width, and b, c follow from the asymmetry c/b. Prandtl-Ishlinskii (`plays = 1`): radii of 50, 150, ...,
-//! 1450 V with weights that fall as exp(−r/spread); their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its middle. The
-//! plays of a run have come from 0 V to its first voltage. g is 1 in the plain forms: which slope of a loop is called its gain is a convention.
+//! opening is 2·h_max, so h_max = 750 V · width, and b, c follow from the asymmetry c/b. Prandtl-Ishlinskii (`plays = 1`): sixteen radii in
+//! geometric series from 30 to 1400 V with weights r^shape; their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its
+//! middle. The plays begin at the first voltage, or (`from_zero = 1`) have come from 0 V to it. g is 1 in the plain forms: which slope of a loop is called its gain is a convention.
 
 use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
 
@@ -51,19 +51,27 @@ pub const HYSTERESIS: Effect = Effect {
             bounds: [0.0, 1.0],
             off: None,
             default: Some(0.0),
-            about: "0: Bouc-Wen; 1: Prandtl-Ishlinskii, with width and spread_v",
+            about: "0: Bouc-Wen; 1: Prandtl-Ishlinskii, with width, shape and from_zero",
         },
         Parameter {
-            name: "spread_v",
-            unit: "V",
-            bounds: [50.0, 1e5],
+            name: "shape",
+            unit: "",
+            bounds: [-2.0, 2.0],
             off: None,
-            default: Some(1000.0),
-            about: "radius over which the weights of the plays fall by e (Prandtl-Ishlinskii)",
+            default: Some(0.0),
+            about: "power of the radius that the weights of the plays go with (Prandtl-Ishlinskii)",
         },
         Parameter { name: "gain", unit: "", bounds: [0.5, 2.0], off: None, default: Some(1.0), about: "g: slope that goes with the loop" },
+        Parameter {
+            name: "from_zero",
+            unit: "",
+            bounds: [0.0, 1.0],
+            off: None,
+            default: Some(0.0),
+            about: "1: the plays have come from 0 V to the first voltage; 0: they are at rest there (Prandtl-Ishlinskii)",
+        },
     ],
-    action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p[0], p[5], p[6], n)) }),
+    action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p[0], p[5], p[6], p[7] > 0.5, n)) }),
 };
 
 /// Stroke that the width is a share of (V).
@@ -133,41 +141,45 @@ impl Voltages for BoucWen {
     }
 }
 
-const RADII: usize = 15;
+const RADII: usize = 16;
 
 fn radius(i: usize) -> f64 {
-    100.0 * i as f64 + 50.0
+    30.0 * (1400.0_f64 / 30.0).powf(i as f64 / (RADII - 1) as f64)
 }
 
 struct Plays {
     weights: [f64; RADII],
+    radii: [f64; RADII],
     gain: f64,
+    from_zero: bool,
     /// p_i of every actuator, one after the other.
     plays: Vec<f64>,
 }
 
 impl Plays {
-    fn new(width: f64, spread: f64, gain: f64, actuators: usize) -> Self {
-        let falling: [f64; RADII] = std::array::from_fn(|i| (-radius(i) / spread).exp());
+    fn new(width: f64, shape: f64, gain: f64, from_zero: bool, actuators: usize) -> Self {
+        let radii = std::array::from_fn(radius);
+        let raw: [f64; RADII] = radii.map(|r: f64| r.powf(shape));
         // Half way through a stroke of S between turning points, the branches of a play of radius r are min(2 r, S − 2 r) apart, or not at all.
-        let opening: f64 = falling.iter().enumerate().map(|(i, w)| w * (2.0 * radius(i)).min(STROKE - 2.0 * radius(i)).max(0.0)).sum();
+        let opening: f64 = raw.iter().zip(&radii).map(|(w, r)| w * (2.0 * r).min(STROKE - 2.0 * r).max(0.0)).sum();
         let scale = width * STROKE / opening / gain;
-        Self { weights: falling.map(|w| scale * w), gain, plays: vec![0.0; RADII * actuators] }
+        Self { weights: raw.map(|w| scale * w), radii, gain, from_zero, plays: vec![0.0; RADII * actuators] }
     }
 }
 
 impl Voltages for Plays {
-    /// All plays have come from 0 V.
     fn settle(&mut self, volts: &mut [f64]) {
-        self.plays.fill(0.0);
+        for (plays, volts) in self.plays.chunks_exact_mut(RADII).zip(&*volts) {
+            plays.fill(if self.from_zero { 0.0 } else { *volts });
+        }
         self.pass(0.0, volts);
     }
 
     fn pass(&mut self, _dt: f64, volts: &mut [f64]) {
         for (plays, volts) in self.plays.chunks_exact_mut(RADII).zip(volts) {
             let mut h = 0.0;
-            for (i, (play, weight)) in plays.iter_mut().zip(&self.weights).enumerate() {
-                *play = play.max(*volts - radius(i)).min(*volts + radius(i));
+            for ((play, weight), radius) in plays.iter_mut().zip(&self.weights).zip(&self.radii) {
+                *play = play.max(*volts - radius).min(*volts + radius);
                 h += weight * (*volts - *play);
             }
             *volts = self.gain * (*volts - h);
@@ -214,13 +226,13 @@ mod tests {
             let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3], 1), step);
             assert!((bouc_wen / 150.0 - 1.0).abs() < 1e-3, "{bouc_wen}");
         }
-        let plays = opening(&mut Plays::new(0.1, 800.0, 1.3, 1), 15.0);
+        let plays = opening(&mut Plays::new(0.1, 0.5, 1.3, false, 1), 15.0);
         assert!((plays / 150.0 - 1.0).abs() < 1e-9, "{plays}");
     }
 
     #[test]
     fn a_minor_loop_closes() {
-        let mut plays = Plays::new(0.2, 800.0, 1.0, 1);
+        let mut plays = Plays::new(0.2, 0.5, 1.0, true, 1);
         plays.settle(&mut [0.0]);
         let mut at = |volts: f64| {
             let mut out = [volts];

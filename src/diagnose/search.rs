@@ -1,0 +1,464 @@
+//! Which causes the data ask for: screening, forward and backward selection, and what could stand in for what.
+//!
+//! Models are fitted to one part of the runs and judged on the other. The constants of the nominal model are free from the beginning, so that a
+//! cause is credited only with what re-tuned constants cannot do; in the end everything that the data do not need is taken out again.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::fit::{Bench, Care, Fit, Residuals, places, square};
+use super::plant::{Model, Plant, Term};
+
+/// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of a sixth of the noise (rms): other
+/// discretisations of one and the same physics differ by nearly that much; ...
+const LEAST_GAIN: f64 = 0.03;
+/// ... and by this share of what re-tuned constants leave unexplained: a cause that is not quite of the form of its model leaves traces that
+/// others could polish away; ...
+const LEAST_SHARE: f64 = 0.004;
+/// ... and by so many standard errors of what noise alone does to the difference, ...
+const LEAST_SIGMAS: f64 = 3.0;
+/// ... and if Bayes's information criterion falls by so much.
+const LEAST_BIC: f64 = 10.0;
+/// Two models are tied if their χ² differ by less than this, or by less than two standard errors.
+const TIED_CHI2: f64 = 12.0;
+/// Candidates that are fitted in full after screening.
+const FINALISTS: usize = 7;
+/// Most causes beside constants.
+const MOST_CAUSES: usize = 4;
+
+/// Runs by what they are for.
+#[derive(Debug, Clone)]
+pub struct Split {
+    /// Parameters are fitted to these.
+    pub fit: Vec<usize>,
+    /// Models are judged on these.
+    pub held: Vec<usize>,
+}
+
+impl Split {
+    /// All runs.
+    pub fn all(&self) -> Vec<usize> {
+        let mut all = [self.fit.as_slice(), &self.held].concat();
+        all.sort_unstable();
+        all
+    }
+}
+
+/// A fitted model with its residuals on all runs.
+#[derive(Debug, Clone)]
+pub struct Scored {
+    /// The fit to the fit runs.
+    pub fit: Fit,
+    /// Residuals of all runs, in standard deviations.
+    pub residuals: Vec<Residuals>,
+    /// χ² of the held-out runs.
+    pub held: f64,
+    /// χ² of the fit runs.
+    pub fitted: f64,
+}
+
+impl Scored {
+    /// χ² of all runs.
+    pub fn total(&self) -> f64 {
+        self.held + self.fitted
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.fit.model
+    }
+
+    /// Number of coordinates.
+    pub fn freedom(&self) -> usize {
+        places(&self.fit.model).len()
+    }
+
+    /// χ² + k ln N of the fit runs.
+    pub fn bic(&self) -> f64 {
+        self.fitted + self.freedom() as f64 * (self.fit.count as f64).ln()
+    }
+}
+
+/// The search's state.
+pub struct Search<'a> {
+    /// Plant and unknowns.
+    pub bench: Bench<'a>,
+    /// The runs.
+    pub split: Split,
+    /// χ² per value, less 1, that re-tuned constants leave on the held-out runs; known after [`calibrated`](Self::calibrated).
+    pub unexplained: f64,
+    /// Told what is being tried.
+    pub progress: &'a (dyn Fn(&str) + Sync),
+}
+
+/// What fitting a candidate on top of the constants gave.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// The candidate.
+    pub candidate: usize,
+    /// The model with it.
+    pub scored: Scored,
+}
+
+impl Search<'_> {
+    /// The candidate's name.
+    pub fn id(&self, candidate: usize) -> &'static str {
+        self.bench.plant.candidates()[candidate].id
+    }
+
+    /// Scores a model as it is.
+    pub fn score(&self, fit: Fit) -> Result<Scored, String> {
+        let all: Vec<usize> = (0..self.bench.plant.signals().len()).collect();
+        let residuals = self.bench.residuals_of(&fit.model, &all)?;
+        let sum = |runs: &[usize]| runs.iter().map(|run| square(&residuals[*run])).sum();
+        Ok(Scored { held: sum(&self.split.held), fitted: sum(&self.split.fit), fit, residuals })
+    }
+
+    /// Fits a model and scores it.
+    pub fn fitted(&self, model: &Model) -> Result<Scored, String> {
+        self.score(self.bench.fit(model, &self.split.fit, Care::Full)?)
+    }
+
+    /// Fits a model well enough to rank it.
+    fn ranked(&self, model: &Model) -> Result<Scored, String> {
+        self.score(self.bench.fit(model, &self.split.fit, Care::Rank)?)
+    }
+
+    /// Fits the runs' unknowns to a model and the model to them, twice.
+    pub fn settle(&mut self, scored: Scored) -> Result<Scored, String> {
+        let mut scored = scored;
+        for _ in 0..2 {
+            let all = self.split.all();
+            self.bench.fit_unknowns(scored.model(), &all)?;
+            scored = self.fitted(scored.model())?;
+        }
+        Ok(scored)
+    }
+
+    /// How far the χ² of `worse` lies above that of `better` on `runs`, in standard errors and in itself.
+    ///
+    /// With d the difference of the predictions in units of the noise, noise of unit variance makes Δχ² scatter by 2 |d|. What is left of
+    /// structure in the residuals of the better model makes that larger by the root of its mean square.
+    pub fn gap(&self, better: &Scored, worse: &Scored, runs: &[usize]) -> (f64, f64) {
+        let (mut sum, mut apart, mut left, mut count) = (0.0, 0.0, 0.0, 0.0);
+        for run in runs {
+            for (a, b) in better.residuals[*run].iter().zip(&worse.residuals[*run]) {
+                sum += b * b - a * a;
+                apart += (b - a) * (b - a);
+                left += a * a;
+                count += 1.0;
+            }
+        }
+        let noise = (left / f64::max(count, 1.0)).max(1.0).sqrt();
+        (sum / (2.0 * noise * apart.sqrt()).max(1e-9), sum)
+    }
+
+    /// Whether `more` is worth its additional parameters beside `less`.
+    pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
+        let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
+        let (sigmas, gain) = self.gap(more, less, runs);
+        let count = self.bench.count(runs) as f64;
+        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && sigmas > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
+    }
+
+    /// Whether two models cannot be told apart by any run.
+    pub fn is_tied(&self, better: &Scored, other: &Scored) -> bool {
+        let (sigmas, gap) = self.gap(better, other, &self.split.all());
+        gap < TIED_CHI2 || sigmas < 2.0
+    }
+
+    fn constants(&self) -> Vec<Term> {
+        // Areal mass enters all motion only by its ratio to the stiffness: one of the two is enough.
+        let candidates = self.bench.plant.candidates().iter().enumerate();
+        let constants = candidates.filter(|(_, c)| c.is_constant && c.id != "areal-mass");
+        constants.map(|(candidate, c)| Term { candidate, x: c.parameters.iter().map(|p| p.off.unwrap_or(p.bounds[0])).collect() }).collect()
+    }
+
+    /// The nominal model with its constants free.
+    pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, String> {
+        let scored = self.fitted(&Model { terms: self.constants(), resolution, fine: false })?;
+        let scored = self.settle(scored)?;
+        let (chi2, runs) = if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) };
+        self.unexplained = (chi2 / self.bench.count(runs).max(1) as f64 - 1.0).max(0.0);
+        Ok(scored)
+    }
+
+    /// How much every start of every candidate would lower χ² on all runs if the model were linear, beside what the model's own coordinates and
+    /// `beside` could do; best first, with the model to fit from.
+    pub fn screen(&self, from: &Scored) -> Result<Vec<(f64, Model)>, String> {
+        let runs = self.split.all();
+        let base = from.model();
+        let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
+        let candidates = self.bench.plant.candidates();
+        let mut starts = Vec::new();
+        for (candidate, c) in candidates.iter().enumerate().filter(|(_, c)| !used.contains(&c.id)) {
+            starts.extend(c.starts.iter().map(|x| Term { candidate, x: x.clone() }));
+        }
+        let flat = |residuals: Vec<Residuals>| DVector::from_vec(residuals.concat());
+        let plain = DVector::from_vec(runs.iter().flat_map(|run| from.residuals[*run].clone()).collect());
+        let own = self.tangents(base, &runs, &plain)?;
+        let columns: Vec<Option<DVector<f64>>> = starts
+            .par_iter()
+            .map(|term| {
+                let mut model = base.clone();
+                model.terms.push(term.clone());
+                self.bench.residuals_of(&model, &runs).ok().map(|r| flat(r) - &plain)
+            })
+            .collect();
+        let rest = without(&own, &plain);
+        let mut ranked = Vec::new();
+        for (term, column) in starts.into_iter().zip(columns) {
+            let Some(column) = column else { continue };
+            let column = without(&own, &column);
+            let length = column.norm_squared();
+            if length < 1e-12 {
+                continue;
+            }
+            let along = -rest.dot(&column) / length;
+            let mut model = base.clone();
+            let c = &candidates[term.candidate];
+            let x: Vec<f64> = term.x.iter().zip(&c.parameters).map(|(x, p)| match p.off {
+                Some(off) => (off + along.clamp(-1.5, 2.0) * (x - off)).clamp(p.bounds[0], p.bounds[1]),
+                None => *x,
+            }).collect();
+            let one_sided = c.parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1]));
+            // A cause that is asked for with the wrong sign starts where it was tried.
+            let wrong = one_sided && along < 0.05;
+            model.terms.push(Term { candidate: term.candidate, x: if wrong { term.x } else { x } });
+            ranked.push((if wrong { 0.0 } else { rest.dot(&column).powi(2) / length }, model));
+        }
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Ok(ranked)
+    }
+
+    /// Derivatives of the residuals by the model's coordinates, made orthogonal.
+    fn tangents(&self, model: &Model, runs: &[usize], plain: &DVector<f64>) -> Result<Vec<DVector<f64>>, String> {
+        let columns: Vec<DVector<f64>> = places(model)
+            .par_iter()
+            .map(|(term, parameter)| {
+                let mut shifted = model.clone();
+                let p = &self.bench.plant.candidates()[model.terms[*term].candidate].parameters[*parameter];
+                let x = &mut shifted.terms[*term].x[*parameter];
+                *x += if *x + 0.02 * p.scale > p.bounds[1] { -0.02 * p.scale } else { 0.02 * p.scale };
+                Ok(DVector::from_vec(self.bench.residuals_of(&shifted, runs)?.concat()) - plain)
+            })
+            .collect::<Result<_, String>>()?;
+        let mut orthogonal: Vec<DVector<f64>> = Vec::new();
+        for column in columns {
+            let size = column.norm();
+            let rest = without(&orthogonal, &column);
+            let left = rest.norm();
+            if left > 1e-6 * size && left > 0.0 {
+                orthogonal.push(rest / left);
+            }
+        }
+        Ok(orthogonal)
+    }
+
+    /// The best screened starts of different candidates, `count` of them.
+    fn finalists(&self, screened: Vec<(f64, Model)>, count: usize) -> Vec<Model> {
+        let mut chosen: Vec<Model> = Vec::new();
+        for (_, model) in screened {
+            let last = |model: &Model| model.terms.last().map(|term| term.candidate);
+            if chosen.len() < count && !chosen.iter().any(|other| last(other) == last(&model)) {
+                chosen.push(model);
+            }
+        }
+        chosen
+    }
+
+    /// Every candidate worth it, fitted on top of `from`; best on held-out runs first.
+    pub fn trials(&self, from: &Scored) -> Result<Vec<Trial>, String> {
+        (self.progress)("screening all candidates");
+        let finalists = self.finalists(self.screen(from)?, FINALISTS);
+        let mut trials = Vec::new();
+        for model in finalists {
+            let Some(term) = model.terms.last() else { continue };
+            (self.progress)(&format!("fitting {}", self.id(term.candidate)));
+            // What cannot be fitted is no explanation.
+            if let Ok(scored) = self.ranked(&model) {
+                trials.push(Trial { candidate: term.candidate, scored });
+            }
+        }
+        trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
+        Ok(trials)
+    }
+
+    /// What models are ranked by: χ² of the held-out runs, or of all where there are none.
+    pub fn judged(&self, scored: &Scored) -> f64 {
+        if self.split.held.is_empty() { scored.bic() } else { scored.held }
+    }
+
+    /// Adds causes while they are worth it. Returns the last model and the first round's trials.
+    pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), String> {
+        let mut best = from;
+        let mut first: Option<Vec<Trial>> = None;
+        for _ in 0..MOST_CAUSES {
+            let trials = self.trials(&best)?;
+            let top = trials.first().map(|trial| trial.scored.clone());
+            if first.is_none() {
+                first = Some(trials);
+            }
+            let Some(top) = top.filter(|top| self.is_worth(top, &best)) else { break };
+            best = self.settle(top)?;
+        }
+        Ok((best, first.unwrap_or_default()))
+    }
+
+    /// Takes out what is not worth it, the least needed first.
+    pub fn backward(&self, from: Scored) -> Result<Scored, String> {
+        let mut best = from;
+        loop {
+            let mut shorter: Vec<Scored> = Vec::new();
+            for index in 0..best.model().terms.len() {
+                let mut model = best.model().clone();
+                let term = model.terms.remove(index);
+                (self.progress)(&format!("doing without {}", self.id(term.candidate)));
+                shorter.push(self.fitted(&model)?);
+            }
+            // What the discretisation could do as well goes first.
+            let plant = self.bench.plant;
+            let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
+            if let Some(idle) = idle {
+                best = shorter.swap_remove(idle);
+                continue;
+            }
+            let least = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total()));
+            match least {
+                Some(least) if !self.is_worth(&best, &least) => best = least,
+                _ => return Ok(best),
+            }
+        }
+    }
+
+    /// Puts every other candidate in the place of every cause: what does better, or as well.
+    pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, String> {
+        let mut found = Vec::new();
+        for index in 0..best.model().terms.len() {
+            let mut model = best.model().clone();
+            let removed = model.terms.remove(index);
+            (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
+            let without = self.fitted(&model)?;
+            let screened = self.screen(&without)?.into_iter().filter(|(_, m)| {
+                m.terms.last().is_some_and(|term| term.candidate != removed.candidate)
+            });
+            for model in self.finalists(screened.collect(), most) {
+                let Some(term) = model.terms.last() else { continue };
+                let candidate = term.candidate;
+                if let Ok(scored) = self.ranked(&model) {
+                    found.push((index, Trial { candidate, scored }));
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// The number of joints that fits best, near the one at hand: χ² over all runs decides, for it has no other parameter.
+    pub fn resolve(&mut self, best: Scored) -> Result<Scored, String> {
+        let ladder = self.bench.plant.resolutions();
+        let mut best = best;
+        let mut tried = vec![best.model().resolution];
+        loop {
+            let Some(at) = ladder.iter().position(|r| *r == best.model().resolution) else { return Ok(best) };
+            let beside = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter_map(|k| ladder.get(k).copied());
+            let mut moved = false;
+            for resolution in beside.filter(|r| !tried.contains(r)).collect::<Vec<_>>() {
+                tried.push(resolution);
+                (self.progress)(&format!("{resolution} joints per actuator"));
+                let other = self.fitted(&Model { resolution, ..best.model().clone() })?;
+                if other.total() < best.total() {
+                    best = other;
+                    moved = true;
+                    break;
+                }
+            }
+            if !moved {
+                return Ok(best);
+            }
+        }
+    }
+}
+
+/// What of a vector is orthogonal to unit vectors.
+fn without(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
+    let mut rest = vector.clone();
+    for direction in unit {
+        let along = direction.dot(&rest);
+        rest.axpy(-along, direction, 1.0);
+    }
+    rest
+}
+
+/// Covariance of a fit's coordinates; infinite variances where the data say nothing.
+pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = information.nrows();
+    if n == 0 {
+        return information.clone();
+    }
+    let scale: Vec<f64> = (0..n).map(|k| information[(k, k)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let by = scale[i] * scale[j];
+        if by > 0.0 { information[(i, j)] / by } else { f64::from(u8::from(i == j)) }
+    });
+    let eigen = scaled.symmetric_eigen();
+    let mut result = DMatrix::zeros(n, n);
+    for (k, value) in eigen.eigenvalues.iter().enumerate() {
+        let v = eigen.eigenvectors.column(k);
+        result += v * v.transpose() / value.max(1e-12);
+    }
+    DMatrix::from_fn(n, n, |i, j| {
+        let by = scale[i] * scale[j];
+        if by > 0.0 { result[(i, j)] / by } else if i == j { f64::INFINITY } else { 0.0 }
+    })
+}
+
+/// Splits runs: those whose role is given as given. The others are put in the order of how fast their inputs are; of every three neighbours one
+/// is held out, by turns the one with the largest and the one with the smallest input, and the slowest and the fastest run never are.
+pub fn split(plant: &dyn Plant, roles: &[super::dataset::Role]) -> Split {
+    use super::dataset::Role;
+    let signals = plant.signals();
+    let mut order: Vec<(usize, f64, f64)> = Vec::new();
+    let (mut fit, mut held) = (Vec::new(), Vec::new());
+    for (run, signal) in signals.iter().enumerate() {
+        match roles.get(run).copied().unwrap_or_default() {
+            Role::Fit => fit.push(run),
+            Role::HeldOut => held.push(run),
+            Role::Auto => {
+                let swing = signal.inputs.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(*u), high.max(*u)]);
+                let range = (swing[1] - swing[0]).max(1e-9);
+                let pairs = signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]);
+                let (mut way, mut time) = (0.0, 0.0);
+                for (u, t) in pairs {
+                    way += (u[1] - u[0]).abs();
+                    time += t[1] - t[0];
+                }
+                order.push((run, way / range / time.max(1e-9), range));
+            }
+        }
+    }
+    order.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
+    let count = order.len();
+    // The slowest and the fastest run stay with the fit.
+    let (ends, middle) = match count {
+        0..=1 => (order.as_slice(), [].as_slice()),
+        2 => (&order[..1], &order[1..]),
+        _ => (&order[..0], &order[1..count - 1]),
+    };
+    fit.extend(ends.iter().map(|(run, ..)| *run));
+    if count > 2 {
+        fit.extend([order[0].0, order[count - 1].0]);
+    }
+    for (index, group) in middle.chunks(3).enumerate() {
+        let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
+        let out = group.iter().max_by(|a, b| (sign * a.2).total_cmp(&(sign * b.2))).map(|(run, ..)| *run);
+        for (run, ..) in group {
+            if Some(*run) == out { held.push(*run) } else { fit.push(*run) }
+        }
+    }
+    if fit.is_empty() {
+        std::mem::swap(&mut fit, &mut held);
+    }
+    fit.sort_unstable();
+    held.sort_unstable();
+    Split { fit, held }
+}
