@@ -2,6 +2,8 @@
 
 mod animate;
 mod crosscheck;
+mod diagnose;
+mod effects;
 mod export;
 mod output;
 mod plot;
@@ -53,6 +55,11 @@ enum Command {
     Animate(animate::Args),
     Crosscheck(crosscheck::Args),
     Reproduce(reproduce::Args),
+    Diagnose(diagnose::Args),
+    /// List the extensions of the model with their parameters.
+    ///
+    /// Example: sfers effects --json
+    Effects,
     /// List the built-in experiments.
     Presets,
     /// Print a built-in experiment, to start from.
@@ -184,6 +191,8 @@ pub fn main() -> ExitCode {
         Command::Animate(args) => animate::run(&args, options),
         Command::Reproduce(args) => reproduce::run(&args, options),
         Command::Crosscheck(args) => crosscheck::run(&args, options),
+        Command::Diagnose(args) => diagnose::run(&args, options),
+        Command::Effects => effects::run(options),
         Command::Presets => presets::list(options),
         Command::Preset { name } => presets::show(&name),
         Command::Completions { shell } => {

@@ -7,11 +7,11 @@ use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
 use super::quality;
 use super::voltage::Command;
 use crate::analytic;
-use crate::drive::{Drive, Waveform};
-use crate::effects::{self, Action, Applied, EFFECTS, Kind, Parameter, Path, View};
-use crate::engine::{Engine, PlanarEngine};
+use crate::drive::{Drive, Table, Waveform};
+use crate::effects::{self, Applied, EFFECTS, Kind, Parameter, Path, View};
+use crate::engine::{Engine, EngineError, PlanarEngine};
 use crate::experiment::hermite;
-use crate::model::{Mount, Robot};
+use crate::model::{Mount, PointMass, Robot};
 
 /// Joints per actuator that are tried: what lies beyond changes a cantilever's frequency by less than 0.06 %.
 const JOINTS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20];
@@ -22,6 +22,22 @@ const GROUND_STEP: f64 = 1e-4;
 const LARGEST_CHANGE: f64 = 0.15;
 /// Of a clamped robot (1/s): a tenth of the engine's own, which at resonance would take 0.2 % of the amplitude.
 const NUMERICAL_DAMPING: f64 = 5.0;
+
+/// An experiment that could be made.
+pub struct Scene {
+    /// The voltages.
+    pub drive: Table,
+    /// Length (s).
+    pub duration: f64,
+    /// A mass (g) that hangs at the end until the beginning.
+    pub hung: f64,
+    /// A known mass (g) at the end.
+    pub added: f64,
+    /// Whether gravity pulls the other way in the sheet's frame.
+    pub turned_over: bool,
+    /// Where it is looked at (cm).
+    pub markers: Vec<f64>,
+}
 
 /// A data set with its robot.
 pub struct RobotPlant {
@@ -70,7 +86,7 @@ impl RobotPlant {
             starts.push(start);
             steps.push(step(&robot, &times));
         }
-        let candidates = candidates(&robot, &dataset.markers.len());
+        let candidates = candidates(&robot, dataset.markers.len());
         let plant = Self {
             markers: dataset.markers.iter().map(|marker| marker.position).collect(),
             channels: dataset.channel_names(),
@@ -129,6 +145,42 @@ impl RobotPlant {
         &self.commands[run]
     }
 
+    /// Marker positions (cm).
+    pub fn markers(&self) -> &[f64] {
+        &self.markers
+    }
+
+    /// The mean of the noise (mm).
+    pub fn noise(&self) -> f64 {
+        let sigmas: Vec<f64> = self.signals.iter().flat_map(|signal| signal.sigmas.iter().copied()).collect();
+        sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64
+    }
+
+    /// Positions (mm) of a scene's markers as `model` has them, x and z of each in `rows` rows.
+    ///
+    /// # Errors
+    /// Why they cannot be simulated.
+    pub fn play(&self, model: &Model, scene: &Scene, rows: usize) -> Result<Vec<f64>, String> {
+        let effects = model.terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
+        let mut robot = self.robot.clone();
+        robot.motors_per_actuator = model.resolution as usize;
+        if scene.turned_over {
+            robot.material.gravity *= -1.0;
+        }
+        let mut drive = Drive { waveform: Waveform::Table(scene.drive.clone()), positive_gain: 1.0, delay: 0.0 };
+        effects::apply(&effects, &mut robot, &mut drive).map_err(|error| error.to_string())?;
+        let end = robot.material.actuator_length * robot.actuators as f64;
+        if scene.added > 0.0 {
+            robot.extensions.point_masses.push(PointMass { mass: scene.added, position: end });
+        }
+        let view = View::new(&effects);
+        let path = Path::new(&effects, robot.actuators, scene.duration);
+        let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
+        let step = self.steps.iter().copied().fold(1e-3, f64::min);
+        let tracks = track_from(&robot, scene.hung, &drive, path, step, &scene.markers, &times).map_err(|error| error.to_string())?;
+        Ok(tracks.into_iter().flat_map(|at| view.of(at).map(|x| 10.0 * x)).collect())
+    }
+
     /// The nominal robot.
     pub fn robot(&self) -> &Robot {
         &self.robot
@@ -172,7 +224,7 @@ fn free(p: &'static Parameter) -> Free {
 }
 
 /// The effects that make sense for a robot, with what is fitted of them, its usual size, and where to start.
-fn candidates(robot: &Robot, markers: &usize) -> Vec<Candidate> {
+pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
     let clamped = robot.mount == Mount::Clamped;
     let ground = robot.mount == Mount::Ground;
     let mut all = Vec::new();
@@ -182,7 +234,7 @@ fn candidates(robot: &Robot, markers: &usize) -> Vec<Candidate> {
             "clamp-compliance" => clamped,
             // With m = 1 nothing but the gain would change; of a single actuator it is the gain.
             "weak-actuator" => robot.actuators > 1,
-            "passive-margin" => robot.actuators > 1 || *markers > 1,
+            "passive-margin" => robot.actuators > 1 || markers > 1,
             _ => effect.kind != Kind::Ground || ground,
         };
         if !fits {
@@ -208,7 +260,7 @@ fn candidates(robot: &Robot, markers: &usize) -> Vec<Candidate> {
                 one("min_v", 2e-4, &[-1.0 / 1300.0, -1.0 / 1000.0, -1.0 / 700.0]),
                 one("max_v", 2e-4, &[1.0 / 1300.0, 1.0 / 800.0, 1.0 / 400.0, 1.0 / 200.0]),
             ],
-            "slew-limit" => vec![one("rate_v_per_s", 2e-6, &[1e-6, 1e-5, 3e-5])],
+            "slew-limit" => vec![one("rate_v_per_s", 2e-6, &[1.5e-6, 3e-6, 6e-6, 1.2e-5, 2.5e-5])],
             "driver-lag" => vec![one("time_constant_s", 2e-3, &[1e-3, 5e-3])],
             "hysteresis" => vec![
                 (
@@ -353,22 +405,44 @@ impl RobotPlant {
 pub fn track(
     robot: &Robot,
     drive: &Drive,
-    mut path: Path,
-    longest_step: f64,
+    path: Path,
+    step: f64,
     markers: &[f64],
     times: &[f64],
-) -> Result<Vec<[f64; 2]>, crate::engine::EngineError> {
-    let h = longest_step;
-    let mut engine = match robot.mount {
-        Mount::Clamped => PlanarEngine::with_numerical_damping(robot, h, NUMERICAL_DAMPING)?,
-        _ => PlanarEngine::new(robot, h)?,
+) -> Result<Vec<[f64; 2]>, EngineError> {
+    track_from(robot, 0.0, drive, path, step, markers, times)
+}
+
+/// The same from rest with a mass `hung` (g) at the end that is gone at the beginning.
+fn track_from(
+    robot: &Robot,
+    hung: f64,
+    drive: &Drive,
+    mut path: Path,
+    h: f64,
+    markers: &[f64],
+    times: &[f64],
+) -> Result<Vec<[f64; 2]>, EngineError> {
+    let build = |robot: &Robot| match robot.mount {
+        Mount::Clamped => PlanarEngine::with_numerical_damping(robot, h, NUMERICAL_DAMPING),
+        _ => PlanarEngine::new(robot, h),
     };
+    let mut engine = build(robot)?;
     let n = robot.actuators;
     let mut start = vec![0.0; n];
     drive.voltages(0.0, &mut start);
     let mut volts = start.clone();
     path.settle(&mut volts);
-    engine.settle(&volts)?;
+    if hung > 0.0 {
+        let mut loaded = robot.clone();
+        let position = robot.material.actuator_length * robot.actuators as f64;
+        loaded.extensions.point_masses.push(PointMass { mass: hung, position });
+        let mut loaded = build(&loaded)?;
+        loaded.settle(&volts)?;
+        engine.load(0, &loaded.save()?)?;
+    } else {
+        engine.settle(&volts)?;
+    }
 
     let segments = robot.segments();
     let origin = -0.5 * segments[0].length;
@@ -384,7 +458,7 @@ pub fn track(
     }
     let nodes = robot.joints() + 2;
     let (mut positions, mut velocities) = (vec![0.0; 3 * nodes], vec![0.0; 3 * nodes]);
-    let mut look = |engine: &mut PlanarEngine, out: &mut Vec<[f64; 4]>| -> Result<(), crate::engine::EngineError> {
+    let mut look = |engine: &mut PlanarEngine, out: &mut Vec<[f64; 4]>| -> Result<(), EngineError> {
         engine.nodes(&mut positions, &mut velocities)?;
         out.clear();
         for (body, share) in &places {
@@ -438,7 +512,7 @@ pub fn track(
     if tracks.iter().flatten().all(|value| value.is_finite()) {
         Ok(tracks)
     } else {
-        Err(crate::engine::EngineError::NotFinite {
+        Err(EngineError::NotFinite {
             what: "a marker".into(),
             value: f64::NAN,
             step,
@@ -446,9 +520,4 @@ pub fn track(
             stable_step: analytic::stable_step(robot),
         })
     }
-}
-
-/// Whether an action belongs to what is seen, for reports.
-pub fn is_view(applied: &Applied) -> bool {
-    matches!(applied.effect.action, Action::View(_))
 }

@@ -1,0 +1,105 @@
+//! `sfers diagnose`: what the simulation gets wrong, and why.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::output::{finish, pending, unwritable};
+use super::{Failure, Options, print};
+use crate::diagnose::dataset::{DataError, Dataset};
+use crate::diagnose::{extended, observations, protocols, quality, report, robot::RobotPlant, verdict};
+
+/// Say what the simulation gets wrong beside measured data, name the cause, and measure what it gains on runs that no fit saw.
+///
+/// Writes DIR/diagnosis.json, report.html, extended.toml (with drive.csv) and residuals.csv, and prints the verdict.
+///
+/// Example: sfers diagnose bench-7/dataset.toml --out diagnosis
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The description of the data.
+    dataset: PathBuf,
+    /// Folder of the results.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Number of simulations at a time; by default one per processor. The results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// End with code 1 unless causes are identified.
+    #[arg(long)]
+    require: bool,
+}
+
+impl From<DataError> for Failure {
+    fn from(error: DataError) -> Self {
+        match error {
+            DataError::Description(error) => error.into(),
+            other => Self::Data(other.to_string()),
+        }
+    }
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
+    finish(pending(&folder.join(name))?, text.as_bytes())
+}
+
+pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+    let dataset = Dataset::read(&args.dataset)?;
+    std::fs::create_dir_all(&args.out).map_err(|error| unwritable(&args.out, &error))?;
+    drop(pending(&args.out.join("diagnosis.json"))?);
+    let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), usize::from);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs)
+        .build()
+        .map_err(|error| Failure::Usage(format!("--jobs {jobs}: {error}")))?;
+    let bar = if options.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    let start = Instant::now();
+    let progress = |what: &str| bar.set_message(what.to_owned());
+    let result = pool.install(|| {
+        if dataset.runs.is_empty() {
+            return observations::diagnose(&dataset, &progress).map(|found| (found, None));
+        }
+        let checked = quality::check(&dataset);
+        let plant = RobotPlant::new(&dataset, &checked);
+        let roles: Vec<_> = dataset.runs.iter().map(|run| run.role).collect();
+        let separate = |models: &[crate::diagnose::plant::Model]| protocols::separate(&plant, models);
+        let outcome = verdict::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), &progress, &separate)?;
+        let files = extended::Files::new(&dataset, &plant, &outcome);
+        let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
+        let context = report::Context { plant: &plant, command: &command, extended: &files.experiment };
+        let page = report::page(&outcome, &context);
+        Ok((outcome.diagnosis, Some((files, page))))
+    });
+    bar.finish_and_clear();
+    let (diagnosis, files) = result.map_err(Failure::Simulation)?;
+    let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(&args.out, &error))?;
+    if let Some((files, page)) = files {
+        write(&args.out, "extended.toml", &files.experiment)?;
+        write(&args.out, "drive.csv", &files.drive)?;
+        write(&args.out, "residuals.csv", &files.residuals)?;
+        write(&args.out, "report.html", &page)?;
+    } else {
+        write(&args.out, "report.html", &observations::page(&diagnosis))?;
+    }
+    write(&args.out, "diagnosis.json", &format!("{json}\n"))?;
+    options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
+    if options.json {
+        print(&format!("{json}\n"))?;
+    } else {
+        let mut text = format!("{}\n", diagnosis.summary);
+        if let Some(next) = &diagnosis.next_experiment {
+            text += &format!("To tell them apart: {next}.\n");
+        }
+        for line in &diagnosis.unexplained {
+            text += &format!("What is left: {line}\n");
+        }
+        print(&text)?;
+    }
+    let identified = matches!(diagnosis.verdict, verdict::Verdict::Named | verdict::Verdict::Tied);
+    Ok(if args.require && !identified { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}

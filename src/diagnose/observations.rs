@@ -1,0 +1,263 @@
+//! Single measured numbers: which one cause, or which two constants, could bring the nominal model to them.
+//!
+//! A handful of numbers cannot be split into fit and held-out, and cannot name a cause; they can rule causes out, and say what ties them.
+
+use super::dataset::{Dataset, Observation};
+use super::fit::{Bench, Care, Fit};
+use super::plant::{Candidate, Model, Plant, Signal, Term};
+use super::robot;
+use super::verdict::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
+use crate::experiment::{self, Config, Control, EffectConfig, Source};
+use crate::recording::measures::Measures;
+use crate::view::escape;
+
+/// A model explains the numbers if each lies within two standard deviations, in the mean.
+const EXPLAINED: f64 = 4.0;
+/// Length (s), step (s) and interval of records (s) of a run whose file says nothing of them.
+const DURATION: f64 = 2.0;
+const STEP: f64 = 2e-4;
+const RECORD: f64 = 1e-3;
+
+/// Numbers as a plant: every number is a run with one value.
+struct Numbers<'a> {
+    dataset: &'a Dataset,
+    signals: Vec<Signal>,
+    candidates: Vec<Candidate>,
+}
+
+/// The experiment behind a number. A resonance that is driven by a sine without frequency is taken from how a step rings.
+fn config(dataset: &Dataset, observation: &Observation) -> Result<Config, String> {
+    let merged = |own: toml::Value, over: toml::Value| match (own, over) {
+        (toml::Value::Table(mut own), toml::Value::Table(over)) => {
+            own.extend(over);
+            toml::Value::Table(own)
+        }
+        (_, over) => over,
+    };
+    let text = |error: &dyn std::fmt::Display| format!("{}: {error}", observation.measure);
+    let value = |v: Result<toml::Value, toml::ser::Error>| v.map_err(|error| text(&error));
+    let robot = merged(value(toml::Value::try_from(&dataset.nominal.robot))?, value(toml::Value::try_from(&observation.robot))?);
+    let material = merged(value(toml::Value::try_from(&dataset.nominal.material))?, value(toml::Value::try_from(&observation.material))?);
+    let mut config = Config {
+        robot: robot.try_into().map_err(|error: toml::de::Error| text(&error))?,
+        material: material.try_into().map_err(|error: toml::de::Error| text(&error))?,
+        drive: observation.drive.clone(),
+        simulation: observation.simulation.clone(),
+        effect: Vec::new(),
+    };
+    let drive = &mut config.drive;
+    if observation.measure == "resonance_hz" && drive.waveform.as_deref() == Some("sine") && drive.frequency_hz.is_none() {
+        let actuators = config.robot.actuators.unwrap_or(5);
+        let volts = drive.amplitudes_v.take().unwrap_or_else(|| vec![drive.amplitude_v.unwrap_or(0.0); actuators]);
+        drive.amplitude_v = None;
+        drive.waveform = Some("step".into());
+        drive.voltages_v = Some(volts);
+    }
+    let s = &mut config.simulation;
+    s.engine.get_or_insert("planar".into());
+    if s.time_step_s.is_none() {
+        s.time_step_s = Some(experiment::StepConfig::Seconds(STEP));
+    }
+    if s.steps.is_none() && s.duration_s.is_none() {
+        s.duration_s = Some(DURATION);
+    }
+    if s.record_every_s.is_none() && s.record_every_steps.is_none() {
+        s.record_every_s = Some(RECORD);
+    }
+    Ok(config)
+}
+
+impl Plant for Numbers<'_> {
+    fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
+
+    fn channels(&self) -> Vec<String> {
+        vec!["value".into()]
+    }
+
+    fn unit(&self) -> &'static str {
+        ""
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    fn predict(&self, model: &Model, run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
+        let observation = &self.dataset.observations[run];
+        let mut config = config(self.dataset, observation)?;
+        for term in &model.terms {
+            let candidate = &self.candidates[term.candidate];
+            let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name.to_owned(), p.value(*x)));
+            let given = candidate.fixed.iter().map(|(name, value)| ((*name).to_owned(), *value));
+            let parameters = free.chain(given).filter(|(_, value)| value.is_finite()).collect();
+            config.effect.push(EffectConfig { id: candidate.id.into(), parameters });
+        }
+        let text = toml::to_string(&config).map_err(|error| error.to_string())?;
+        let experiment = experiment::experiment(&Source::from_text(&observation.measure, text)).map_err(|error| error.to_string())?;
+        let mut engine = experiment.engine().map_err(|error| error.to_string())?;
+        let done = experiment::run(&experiment, engine.as_mut(), |_| Control::Continue).map_err(|error| error.to_string())?;
+        let measures = Measures::of(&done.recording, experiment.robot.mount, experiment.drive.period());
+        let value = measures.get(&observation.measure);
+        Ok(vec![value.ok_or_else(|| format!("{} cannot be had from its drive", observation.measure))?])
+    }
+}
+
+/// What single numbers say: which single causes and which pairs of constants reach them.
+///
+/// # Errors
+/// If the nominal model cannot be simulated, in words.
+pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<Diagnosis, String> {
+    for observation in &dataset.observations {
+        if !Measures::names().contains(&observation.measure) {
+            return Err(format!("there is no measure {}; choose from {}", observation.measure, Measures::names().join(", ")));
+        }
+    }
+    let signals = dataset.observations.iter().enumerate().map(|(index, o)| Signal {
+        id: format!("{}-{}", index + 1, o.measure),
+        values: vec![o.value],
+        sigmas: vec![o.sigma],
+        times: vec![0.0],
+        channels: vec![0],
+        inputs: vec![0.0],
+    });
+    let plant = Numbers { dataset, signals: signals.collect(), candidates: robot::candidates(&dataset.robot, 1) };
+    let runs: Vec<usize> = (0..plant.signals.len()).collect();
+    let bench = Bench::new(&plant);
+    let resolution = dataset.robot.motors_per_actuator as f64;
+    let nominal = Model { terms: Vec::new(), resolution, fine: false };
+    let nominal = bench.fit(&nominal, &runs, Care::Full)?;
+    let count = runs.len() as f64;
+
+    // One cause at a time, then two constants: with one number each a fit proves nothing, so all that reach them are listed.
+    let mut fits: Vec<Fit> = Vec::new();
+    for (candidate, c) in plant.candidates.iter().enumerate().filter(|(_, c)| c.parameters.len() == 1) {
+        progress(c.id);
+        let tried = c.starts.iter().filter_map(|x| {
+            let terms = vec![Term { candidate, x: x.clone() }];
+            bench.fit(&Model { terms, resolution, fine: false }, &runs, Care::Full).ok()
+        });
+        fits.extend(tried.min_by(|a, b| a.chi2.total_cmp(&b.chi2)));
+    }
+    let single: Vec<Fit> = fits.iter().filter(|fit| fit.chi2 <= EXPLAINED * count).cloned().collect();
+    let mut pairs = Vec::new();
+    if single.is_empty() {
+        let constants: Vec<usize> = (0..plant.candidates.len()).filter(|c| plant.candidates[*c].is_constant).collect();
+        for (index, a) in constants.iter().enumerate() {
+            for b in &constants[index + 1..] {
+                progress(&format!("{} with {}", plant.candidates[*a].id, plant.candidates[*b].id));
+                let term = |candidate: usize| Term { candidate, x: vec![1.0] };
+                let start = Model { terms: vec![term(*a), term(*b)], resolution, fine: false };
+                pairs.extend(bench.fit(&start, &runs, Care::Full).ok().filter(|fit| fit.chi2 <= EXPLAINED * count));
+            }
+        }
+    }
+    let mut explained = if single.is_empty() { pairs } else { single };
+    explained.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let fine = nominal.chi2 <= EXPLAINED * count;
+    let name = |fit: &Fit| fit.model.terms.iter().map(|term| plant.candidates[term.candidate].id).collect::<Vec<_>>().join(" with ");
+    let effects: Vec<Adopted> = if fine {
+        Vec::new()
+    } else {
+        let adopted = |fit: &Fit| {
+            let terms = fit.model.terms.iter().enumerate();
+            terms
+                .map(|(index, term)| {
+                    let c = &plant.candidates[term.candidate];
+                    let spread = 1.96 * super::search::covariance(&fit.information)[(index, index)].sqrt();
+                    let free = &c.parameters[0];
+                    let ends = [term.x[0] - spread, term.x[0] + spread].map(|x| free.value(x.clamp(free.bounds[0], free.bounds[1])));
+                    Adopted {
+                        id: c.id.into(),
+                        kind: c.kind.into(),
+                        cause: c.cause.into(),
+                        parameters: vec![Estimate {
+                            name: free.name.into(),
+                            value: free.value(term.x[0]),
+                            unit: free.unit.into(),
+                            ci95: [Some(ends[0].min(ends[1])), Some(ends[0].max(ends[1]))].map(|end| end.filter(|x: &f64| x.is_finite())),
+                            at_bound: term.x[0] <= free.bounds[0] || term.x[0] >= free.bounds[1],
+                        }],
+                        tied_with: Vec::new(),
+                        gain_heldout: 0.0,
+                        fixed: c.fixed.iter().map(|(name, value)| ((*name).into(), *value)).collect(),
+                    }
+                })
+                .collect::<Vec<_>>()
+        };
+        let others: Vec<String> = explained.iter().skip(1).map(&name).collect();
+        let mut first = explained.first().map(adopted).unwrap_or_default();
+        first.iter_mut().for_each(|effect| effect.tied_with.clone_from(&others));
+        first
+    };
+    let verdict = match (fine, explained.len()) {
+        (true, _) => Verdict::None,
+        (false, 0) => Verdict::Unexplained,
+        // A number or two never name one cause.
+        (false, _) => Verdict::Tied,
+    };
+    let stage = |fit: &Fit| -> Result<Stage, String> {
+        let residuals = bench.residuals_of(&fit.model, &runs)?;
+        let runs = plant.signals.iter().zip(&residuals).map(|(signal, r)| RunError {
+            id: signal.id.clone(),
+            role: "fit",
+            rmse_mm: r[0].abs() * signal.sigmas[0],
+            rmse_noises: r[0].abs(),
+        });
+        Ok(Stage { runs: runs.collect(), rmse_mm: 0.0, rmse_heldout_mm: 0.0, rmse_heldout_ci95_mm: [0.0; 2], residual_tests: Vec::new(), parameters: Vec::new() })
+    };
+    let list = explained.iter().map(&name).collect::<Vec<_>>().join("; ");
+    let summary = match verdict {
+        Verdict::None => "The nominal model reaches all numbers within two standard deviations.".to_owned(),
+        Verdict::Unexplained => "No single cause and no two constants of the nominal model reach all numbers.".to_owned(),
+        _ => format!("The nominal model misses the numbers; these would reach them, and the numbers cannot tell which it is: {list}."),
+    };
+    let mut ranked: Vec<&Fit> = fits.iter().collect();
+    ranked.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
+    let best = explained.first().filter(|_| !fine).unwrap_or(&nominal);
+    Ok(Diagnosis {
+        schema: 1,
+        dataset: dataset.name.clone(),
+        verdict,
+        summary,
+        effects,
+        unexplained_fraction: if nominal.chi2 > count { ((best.chi2 - count).max(0.0) / (nominal.chi2 - count)).min(1.0) } else { 0.0 },
+        unexplained: Vec::new(),
+        noise_mm: 0.0,
+        baseline: stage(&nominal)?,
+        calibrated: stage(best)?,
+        extended: stage(best)?,
+        candidates: ranked
+            .into_iter()
+            .map(|fit| Ranked { id: name(fit), rmse_heldout_mm: (fit.chi2 / count).sqrt(), delta_bic: fit.chi2 + count.ln() - nominal.chi2 })
+            .collect(),
+        correlations: Vec::new(),
+        condition: 1.0,
+        next_experiment: (verdict == Verdict::Tied).then(|| {
+            "weigh the sheet (mass), film the root and the whole shape at rest and under a slow voltage (clamp, curvature, gain), and let it ring from \
+             two amplitudes (damping, softening)"
+                .to_owned()
+        }),
+        data_quality: Vec::new(),
+        remarks: vec!["candidates are ranked by their misfit in standard deviations; there is no held-out number".into()],
+    })
+}
+
+/// A short page: the summary and every number.
+pub fn page(d: &Diagnosis) -> String {
+    let mut out = format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Diagnosis of {0}</title></head><body><h1>Diagnosis of {0}</h1><p>{1}</p>\
+         <table><tr><th>number</th><th>nominal (standard deviations)</th><th>best</th></tr>",
+        escape(&d.dataset),
+        escape(&d.summary)
+    );
+    for (a, b) in d.baseline.runs.iter().zip(&d.extended.runs) {
+        out += &format!("<tr><td>{}</td><td>{:.2}</td><td>{:.2}</td></tr>", escape(&a.id), a.rmse_noises, b.rmse_noises);
+    }
+    out += "</table><table><tr><th>cause</th><th>misfit (standard deviations, rms)</th></tr>";
+    for c in &d.candidates {
+        out += &format!("<tr><td>{}</td><td>{:.2}</td></tr>", c.id, c.rmse_heldout_mm);
+    }
+    out + &format!("</table><p>{}</p></body></html>\n", escape(d.next_experiment.as_deref().unwrap_or("")))
+}
