@@ -269,13 +269,13 @@ pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
                     vec![("exponent", 1.0), ("plays", 0.0)],
                 ),
                 (
-                    vec![("width", 0.05), ("shape", 0.5), ("gain", 0.1)],
-                    vec![vec![0.05, 0.0, 1.0], vec![0.2, 0.5, 1.0]],
+                    vec![("width", 0.05), ("shape", 0.5), ("gain", 0.1), ("decay_per_kv", 2.0)],
+                    vec![vec![0.05, 0.0, 1.0, 1.0], vec![0.2, 0.5, 1.0, 1.0]],
                     vec![("plays", 1.0), ("from_zero", 0.0)],
                 ),
                 (
-                    vec![("width", 0.05), ("shape", 0.5), ("gain", 0.1)],
-                    vec![vec![0.05, 0.0, 1.0]],
+                    vec![("width", 0.05), ("shape", 0.5), ("gain", 0.1), ("decay_per_kv", 2.0)],
+                    vec![vec![0.05, 0.0, 1.0, 1.0]],
                     vec![("plays", 1.0), ("from_zero", 1.0)],
                 ),
             ],

@@ -6,8 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::dataset::Role;
 use super::fit::{Bench, Care, Fit, Residuals, places, square};
-use super::plant::{Model, Plant, Term};
+use super::plant::{Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of a sixth of the noise (rms): other
 /// discretisations of one and the same physics differ by nearly that much; ...
@@ -23,6 +24,8 @@ const LEAST_BIC: f64 = 10.0;
 const TIED_CHI2: f64 = 12.0;
 /// Candidates that are fitted in full after screening.
 const FINALISTS: usize = 7;
+/// Most turns between the runs' unknowns and the model.
+const MOST_TURNS: usize = 10;
 /// Most causes beside constants.
 const MOST_CAUSES: usize = 4;
 
@@ -124,13 +127,17 @@ impl Search<'_> {
         self.score(self.bench.fit(model, &self.split.fit, Care::Rank)?)
     }
 
-    /// Fits the runs' unknowns to a model and the model to them, twice.
+    /// Fits the runs' unknowns to a model and the model to them, by turns until nothing changes.
     pub fn settle(&mut self, scored: Scored) -> Result<Scored, String> {
         let mut scored = scored;
-        for _ in 0..2 {
-            let all = self.split.all();
+        let all = self.split.all();
+        for _ in 0..MOST_TURNS {
+            let before = scored.total();
             self.bench.fit_unknowns(scored.model(), &all)?;
             scored = self.fitted(scored.model())?;
+            if before - scored.total() < 1e-3 * (before - self.bench.count(&all) as f64).max(self.bench.count(&all) as f64) {
+                break;
+            }
         }
         Ok(scored)
     }
@@ -412,53 +419,70 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Splits runs: those whose role is given as given. The others are put in the order of how fast their inputs are; of every three neighbours one
-/// is held out, by turns the one with the largest and the one with the smallest input, and the slowest and the fastest run never are.
-pub fn split(plant: &dyn Plant, roles: &[super::dataset::Role]) -> Split {
-    use super::dataset::Role;
+/// Splits runs: those whose role is given as given. Of the others, runs whose input jumps and runs whose input is smooth are split alike: put in
+/// the order of how fast their inputs are, one of every three neighbours is held out, by turns the one with the largest and the one with the
+/// smallest input; the slowest and the fastest never are. Of two or three runs in all, the middle or last one is.
+pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
     let signals = plant.signals();
-    let mut order: Vec<(usize, f64, f64)> = Vec::new();
     let (mut fit, mut held) = (Vec::new(), Vec::new());
+    let mut kinds: [Vec<Pace>; 2] = [Vec::new(), Vec::new()];
     for (run, signal) in signals.iter().enumerate() {
         match roles.get(run).copied().unwrap_or_default() {
             Role::Fit => fit.push(run),
             Role::HeldOut => held.push(run),
             Role::Auto => {
-                let swing = signal.inputs.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(*u), high.max(*u)]);
-                let range = (swing[1] - swing[0]).max(1e-9);
-                let pairs = signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]);
-                let (mut way, mut time) = (0.0, 0.0);
-                for (u, t) in pairs {
-                    way += (u[1] - u[0]).abs();
-                    time += t[1] - t[0];
-                }
-                order.push((run, way / range / time.max(1e-9), range));
+                let pace = Pace::of(run, signal);
+                kinds[usize::from(pace.jumps)].push(pace);
             }
         }
     }
-    order.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
-    let count = order.len();
-    // The slowest and the fastest run stay with the fit.
-    let (ends, middle) = match count {
-        0..=1 => (order.as_slice(), [].as_slice()),
-        2 => (&order[..1], &order[1..]),
-        _ => (&order[..0], &order[1..count - 1]),
-    };
-    fit.extend(ends.iter().map(|(run, ..)| *run));
-    if count > 2 {
-        fit.extend([order[0].0, order[count - 1].0]);
-    }
-    for (index, group) in middle.chunks(3).enumerate() {
-        let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
-        let out = group.iter().max_by(|a, b| (sign * a.2).total_cmp(&(sign * b.2))).map(|(run, ..)| *run);
-        for (run, ..) in group {
-            if Some(*run) == out { held.push(*run) } else { fit.push(*run) }
+    for mut order in kinds {
+        order.sort_by(|a, b| a.speed.total_cmp(&b.speed).then(a.range.total_cmp(&b.range)));
+        let count = order.len();
+        let inner = if count < 3 { 0..0 } else { 1..count - 1 };
+        let mut out = Vec::new();
+        for (index, group) in order[inner].chunks(3).enumerate() {
+            let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
+            out.extend(group.iter().max_by(|a, b| (sign * a.range).total_cmp(&(sign * b.range))).map(|pace| pace.run));
         }
-    }
-    if fit.is_empty() {
-        std::mem::swap(&mut fit, &mut held);
+        for pace in order {
+            if out.contains(&pace.run) { held.push(pace.run) } else { fit.push(pace.run) }
+        }
     }
     fit.sort_unstable();
     held.sort_unstable();
+    if fit.is_empty() {
+        std::mem::swap(&mut fit, &mut held);
+    }
+    if held.is_empty() && fit.len() >= 2 && roles.iter().all(|role| *role == Role::Auto) {
+        held.extend(fit.pop());
+    }
     Split { fit, held }
+}
+
+/// How a run's input goes.
+struct Pace {
+    run: usize,
+    /// Swings per second.
+    speed: f64,
+    range: f64,
+    /// Whether it changes by a good part of its range from one row to the next.
+    jumps: bool,
+}
+
+impl Pace {
+    fn of(run: usize, signal: &Signal) -> Self {
+        let (low, high) = signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+        let range = (high - low).max(1e-9);
+        let (mut way, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
+        for (u, t) in signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]) {
+            way += (u[1] - u[0]).abs();
+            largest = largest.max((u[1] - u[0]).abs());
+            time += t[1] - t[0];
+        }
+        let rows = signal.inputs.len().max(1) as f64;
+        // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
+        let jumps = largest > 6.0 * way / rows && largest > 0.05 * range;
+        Self { run, speed: way / range / f64::max(time, 1e-9), range, jumps }
+    }
 }

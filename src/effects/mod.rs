@@ -239,8 +239,8 @@ impl Effect {
                 return Err(EffectError::UnknownParameter { id: self.id, name: name.into(), known: known.join(", ") });
             };
             let p = &self.parameters[index];
-            // An infinite off value lies outside the bounds of what can be fitted.
-            if !(p.bounds[0]..=p.bounds[1]).contains(&value) && p.off != Some(value) {
+            // An infinite value that stands for none lies outside the bounds of what can be fitted.
+            if !(p.bounds[0]..=p.bounds[1]).contains(&value) && ![p.off, p.default].contains(&Some(value)) {
                 let [low, high] = p.bounds;
                 return Err(EffectError::Range { id: self.id, name: p.name, value, low, high });
             }

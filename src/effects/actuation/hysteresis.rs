@@ -7,7 +7,7 @@
 //!
 //! Both depend on the way of the voltage only, not on its rate. `width` is the opening of the loop as a share of a 1500 V stroke. Bouc-Wen: the
 //! opening is 2·h_max, so h_max = 750 V · width, and b, c follow from the asymmetry c/b. Prandtl-Ishlinskii (`plays = 1`): sixteen radii in
-//! geometric series from 30 to 1400 V with weights r^shape; their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its
+//! geometric series from 30 to 1400 V with weights r^shape·exp(−decay·r); their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its
 //! middle. The plays begin at the first voltage, or (`from_zero = 1`) have come from 0 V to it. g is 1 in the plain forms: which slope of a loop is called its gain is a convention.
 
 use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
@@ -51,7 +51,7 @@ pub const HYSTERESIS: Effect = Effect {
             bounds: [0.0, 1.0],
             off: None,
             default: Some(0.0),
-            about: "0: Bouc-Wen; 1: Prandtl-Ishlinskii, with width, shape and from_zero",
+            about: "0: Bouc-Wen; 1: Prandtl-Ishlinskii, with width, shape, decay_per_kv and from_zero",
         },
         Parameter {
             name: "shape",
@@ -70,8 +70,16 @@ pub const HYSTERESIS: Effect = Effect {
             default: Some(0.0),
             about: "1: the plays have come from 0 V to the first voltage; 0: they are at rest there (Prandtl-Ishlinskii)",
         },
+        Parameter {
+            name: "decay_per_kv",
+            unit: "1/kV",
+            bounds: [0.0, 20.0],
+            off: None,
+            default: Some(0.0),
+            about: "how fast the weights of the plays fall with the radius beside that power (Prandtl-Ishlinskii)",
+        },
     ],
-    action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p[0], p[5], p[6], p[7] > 0.5, n)) }),
+    action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p, n)) }),
 };
 
 /// Stroke that the width is a share of (V).
@@ -157,13 +165,14 @@ struct Plays {
 }
 
 impl Plays {
-    fn new(width: f64, shape: f64, gain: f64, from_zero: bool, actuators: usize) -> Self {
+    fn new(p: &[f64], actuators: usize) -> Self {
+        let (width, shape, gain, decay) = (p[0], p[5], p[6], 1e-3 * p[8]);
         let radii = std::array::from_fn(radius);
-        let raw: [f64; RADII] = radii.map(|r: f64| r.powf(shape));
+        let raw: [f64; RADII] = radii.map(|r: f64| r.powf(shape) * (-decay * r).exp());
         // Half way through a stroke of S between turning points, the branches of a play of radius r are min(2 r, S − 2 r) apart, or not at all.
         let opening: f64 = raw.iter().zip(&radii).map(|(w, r)| w * (2.0 * r).min(STROKE - 2.0 * r).max(0.0)).sum();
         let scale = width * STROKE / opening / gain;
-        Self { weights: raw.map(|w| scale * w), radii, gain, from_zero, plays: vec![0.0; RADII * actuators] }
+        Self { weights: raw.map(|w| scale * w), radii, gain, from_zero: p[7] > 0.5, plays: vec![0.0; RADII * actuators] }
     }
 }
 
@@ -226,13 +235,13 @@ mod tests {
             let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3], 1), step);
             assert!((bouc_wen / 150.0 - 1.0).abs() < 1e-3, "{bouc_wen}");
         }
-        let plays = opening(&mut Plays::new(0.1, 0.5, 1.3, false, 1), 15.0);
+        let plays = opening(&mut Plays::new(&[0.1, 0.0, 0.0, 1.0, 1.0, 0.5, 1.3, 0.0, 1.0], 1), 15.0);
         assert!((plays / 150.0 - 1.0).abs() < 1e-9, "{plays}");
     }
 
     #[test]
     fn a_minor_loop_closes() {
-        let mut plays = Plays::new(0.2, 0.5, 1.0, true, 1);
+        let mut plays = Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 1.0, 0.0], 1);
         plays.settle(&mut [0.0]);
         let mut at = |volts: f64| {
             let mut out = [volts];

@@ -1,0 +1,272 @@
+//! The effects as a user applies them: off they change no bit, on they do what their equations say.
+
+use std::f64::consts::PI;
+
+use sfers::analytic;
+use sfers::effects::{self, EFFECTS, Kind};
+use sfers::experiment::{self, Control, Run, Source};
+
+const CANTILEVER: &str = "[robot]\nactuators = 1\nmount = \"clamped\"\ndamping_eta = 0.008\n[drive]\nwaveform = \"sine\"\namplitude_v = -1000\n\
+    frequency_hz = 5\n[simulation]\nengine = \"planar\"\nstart = \"settled\"\ntime_step_s = 1e-4\nduration_s = 0.3\nrecord_every_s = 1e-3\n";
+const ROBOT: &str = "[robot]\nmotors_per_actuator = 1\n[drive]\nwaveform = \"gait\"\ngait = \"crawl\"\nfrequency_hz = 14\n[simulation]\n\
+    engine = \"planar\"\ntime_step_s = 1e-4\nduration_s = 0.2\n";
+
+fn run(text: &str, settings: &[&str]) -> Run {
+    let mut source = Source::from_text("test", text);
+    settings.iter().for_each(|setting| source.set(setting).unwrap());
+    let experiment = experiment::experiment(&source).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    experiment::run(&experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap()
+}
+
+fn with(text: &str, id: &str, values: &[(&str, f64)]) -> String {
+    let values: String = values.iter().map(|(name, value)| format!("{name} = {value:?}\n").replace("NaN", "nan")).collect();
+    format!("{text}\n[[effect]]\nid = \"{id}\"\n{values}")
+}
+
+/// Height of the right end in the last record (cm).
+fn tip(run: &Run) -> f64 {
+    let r = &run.recording;
+    r.node(r.len() - 1, r.nodes() - 1)[2]
+}
+
+#[test]
+fn at_its_off_value_an_effect_changes_no_bit_in_either_engine() {
+    for (text, engine, settings) in [
+        (CANTILEVER, "planar", vec![]),
+        (ROBOT, "planar", vec![]),
+        (CANTILEVER, "bullet", vec!["simulation.start=flat", "simulation.time_step_s=2e-5", "simulation.duration_s=0.02"]),
+        (ROBOT, "bullet", vec!["simulation.time_step_s=2e-5", "simulation.duration_s=0.02"]),
+    ] {
+        let engine = format!("simulation.engine={engine}");
+        let settings: Vec<&str> = settings.into_iter().chain([engine.as_str()]).collect();
+        let plain = run(text, &settings).recording;
+        for effect in EFFECTS.iter().filter(|effect| effect.id != "discretisation") {
+            let off = effect.off();
+            let values: Vec<_> = effect.parameters.iter().zip(&off.values).map(|(p, v)| (p.name, *v)).collect();
+            // TOML writes infinities as inf.
+            assert_eq!(run(&with(text, effect.id, &values), &settings).recording, plain, "{}", effect.id);
+        }
+    }
+}
+
+#[test]
+fn near_its_off_value_an_effect_changes_little_and_further_off_more() {
+    // Limits, whose off value is infinite, act all at once: their own tests follow.
+    let is_limit = |effect: &&&effects::Effect| effect.parameters.iter().any(|p| p.off.is_some_and(f64::is_infinite));
+    for effect in EFFECTS.iter().filter(|effect| effect.id != "discretisation" && !is_limit(effect)) {
+        // Positive voltages, for the one effect that asks for them.
+        let positive = CANTILEVER.replace("-1000", "400");
+        let text = match effect.id {
+            "polarity-asymmetry" => positive.as_str(),
+            _ if effect.kind == Kind::Ground => ROBOT,
+            _ => CANTILEVER,
+        };
+        let plain = run(text, &[]).recording;
+        let moved = |share: f64| {
+            let values: Vec<_> = effect
+                .parameters
+                .iter()
+                .map(|p| {
+                    let value = match p.off {
+                        Some(off) => off + share * if p.bounds[1] > off { (p.bounds[1] - off).min(5.0) } else { p.bounds[0] - off },
+                        None => p.default.filter(|value| value.is_finite()).unwrap_or(1.0),
+                    };
+                    (p.name, value)
+                })
+                .filter(|(name, _)| *name != "position_mm")
+                .collect();
+            let other = run(&with(text, effect.id, &values), &[]).recording;
+            other.positions.iter().zip(&plain.positions).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        let (small, large) = (moved(1e-3), moved(0.1));
+        // A single robot of one actuator has no other to be weaker than; a jump's landing may amplify.
+        assert!(large > 1e-9, "{}: {small} {large}", effect.id);
+        assert!(small < 0.3 * large, "{}: {small} {large}", effect.id);
+    }
+}
+
+#[test]
+fn limits_of_the_driver_act_beyond_them_only() {
+    let statics = CANTILEVER.replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", "waveform = \"dc\"\nvoltages_v = [-1000]");
+    let settings = ["simulation.duration_s=0.01"];
+    let limited = |v: f64| tip(&run(&with(&statics, "saturation", &[("min_v", v)]), &settings));
+    let half = statics.replace("[-1000]", "[-500]");
+    assert_eq!(limited(-500.0), tip(&run(&half, &settings)));
+    assert_eq!(limited(-1000.0), tip(&run(&statics, &settings)));
+    // 0 to −1000 V at 5 Hz rises by at most 500·2π·5 = 15.7 kV/s.
+    let slewed = |rate: f64| run(&with(CANTILEVER, "slew-limit", &[("rate_v_per_s", rate)]), &[]).recording;
+    assert_eq!(slewed(2e4).positions, run(CANTILEVER, &[]).recording.positions);
+    assert_ne!(slewed(1e4).positions, run(CANTILEVER, &[]).recording.positions);
+}
+
+#[test]
+fn a_clamp_that_gives_adds_its_turn_to_the_sag() {
+    let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01"];
+    let [stiff, soft] = [0.0, 0.5].map(|c| tip(&run(&with(CANTILEVER, "clamp-compliance", &[("compliance_rad_per_n_m", c)]), &rest)));
+    // The root moment is M g L/2; the turn c M g L/2 lowers the tip by L times it.
+    let moment = 4.804359999999999 * 980.0 * 5.0;
+    let expected = -0.5e-7 * moment * 10.0;
+    assert!(((soft - stiff) / expected - 1.0).abs() < 1e-3, "{stiff} {soft} {expected}");
+}
+
+#[test]
+fn a_tip_mass_deepens_the_sag_as_the_beam_says() {
+    let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01", "robot.motors_per_actuator=20"];
+    let [plain, heavy] = [0.0, 0.1].map(|m| tip(&run(&with(CANTILEVER, "tip-mass", &[("mass_g", m)]), &rest)));
+    // m g L³/3B against M g L³/8B: by (8/3) m/M.
+    let expected = 1.0 + 8.0 / 3.0 * 0.1 / 4.804359999999999;
+    // The chain's error at m = 20 is 1/(2m²) of either.
+    assert!((heavy / plain / expected - 1.0).abs() < 2e-3, "{plain} {heavy} {expected}");
+}
+
+#[test]
+fn curvature_at_rest_bends_like_a_voltage_of_the_same_curvature() {
+    let settings = ["simulation.duration_s=0.01", "drive.waveform=dc", "material.gravity_m_s2=0"];
+    let text = |volts: f64| CANTILEVER.replace("amplitude_v = -1000\nfrequency_hz = 5", &format!("voltages_v = [{volts:?}]"));
+    let curved = run(&with(&text(0.0), "initial-curvature", &[("curvature_per_m", 0.5)]), &settings);
+    // −γ V with γ = β/L.
+    let volts = -0.5e-2 / (3.6327811654911875e-4 / 10.0);
+    assert!((tip(&curved) / tip(&run(&text(volts), &settings)) - 1.0).abs() < 1e-9);
+}
+
+/// Logarithmic decrements from cycle to cycle of a cantilever that rings down from a voltage step, and the amplitudes (cm) they belong to.
+fn decay(id: &str, values: &[(&str, f64)]) -> Vec<(f64, f64)> {
+    let text = CANTILEVER
+        .replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", "waveform = \"step\"\nvoltages_v = [-600]\nat_s = 0.01")
+        .replace("damping_eta = 0.008", "damping_eta = 0.001");
+    let settings = ["simulation.duration_s=0.8", "simulation.time_step_s=5e-5", "simulation.record_every_s=1e-4", "material.gravity_m_s2=0"];
+    let r = run(&with(&text, id, values), &settings).recording;
+    let z: Vec<f64> = (0..r.len()).map(|k| r.node(k, r.nodes() - 1)[2]).collect();
+    // Of turning points, half the distance from one to the next.
+    let turns: Vec<f64> = z.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0).map(|w| w[1]).collect();
+    let sizes: Vec<f64> = turns.windows(2).map(|w| 0.5 * (w[1] - w[0]).abs()).collect();
+    sizes.windows(2).skip(2).map(|w| (w[0], 2.0 * (w[0] / w[1]).ln())).collect()
+}
+
+#[test]
+fn decay_tells_viscous_dry_and_square_losses_apart() {
+    let slope = |points: &[(f64, f64)]| {
+        let n = points.len() as f64;
+        let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+        let sxy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+        let sxx: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
+        (sxy / sxx, my)
+    };
+    let plain = slope(&decay("damping", &[("scale", 1.0 + 1e-12)]));
+    // ζ = D f/2.
+    let f1 = analytic::cantilever_frequency(&robot());
+    assert!((plain.1 / (2.0 * PI * 0.001 * f1 * 0.5) - 1.0).abs() < 0.06, "{plain:?}");
+    let drag = slope(&decay("air-drag", &[("drag_coefficient", 2.0)]));
+    let dry = slope(&decay("dry-friction", &[("moment_mn_m", 0.02)]));
+    // Drag damps large motion more, dry friction small motion.
+    assert!(drag.0 > 5.0 * plain.0.abs() && drag.1 > 1.05 * plain.1, "{plain:?} {drag:?}");
+    assert!(dry.0 < -5.0 * plain.0.abs() && dry.1 > 1.2 * plain.1, "{plain:?} {dry:?}");
+    // Drag: ζ is 0.16 % at 10 mm with a coefficient of 2, in proportion to both; decrement 2πζ.
+    let at_10_mm = drag.1 - plain.1;
+    let mean = decay("air-drag", &[("drag_coefficient", 2.0)]);
+    let amplitude = mean.iter().map(|p| p.0).sum::<f64>() / mean.len() as f64;
+    assert!((at_10_mm / (2.0 * PI * 0.0016 * amplitude) - 1.0).abs() < 0.15, "{at_10_mm} {amplitude}");
+}
+
+fn robot() -> sfers::model::Robot {
+    experiment::experiment(&Source::from_text("test", CANTILEVER)).unwrap().robot
+}
+
+#[test]
+fn a_structural_loss_damps_the_same_at_any_frequency() {
+    // Phase of a slow response: η_h below resonance, whatever the frequency, where viscous damping lags by 2πfη.
+    let phase = |frequency: f64| {
+        let settings = [format!("drive.frequency_hz={frequency}"), format!("simulation.duration_s={}", 6.0 / frequency)];
+        let settings: Vec<&str> = settings.iter().map(String::as_str).chain(["robot.damping_eta=0"]).collect();
+        let lag = |loss: f64| {
+            let text = with(CANTILEVER, "structural-damping", &[("loss_factor", loss)]);
+            let run = run(&text, &settings);
+            sfers::recording::measures::Measures::of(&run.recording, sfers::model::Mount::Clamped, Some(1.0 / frequency)).tip_phase_deg.unwrap()
+        };
+        lag(0.0) - lag(0.02)
+    };
+    for frequency in [1.0, 3.0] {
+        // A ladder of one rung per decade ripples by a tenth.
+        assert!((phase(frequency).to_radians() / 0.02 - 1.0).abs() < 0.15, "{frequency}: {}", phase(frequency));
+    }
+}
+
+#[test]
+fn softening_lowers_the_frequency_of_large_motion_only() {
+    let period = |volts: f64, a: f64| {
+        let text = with(CANTILEVER, "stiffness-softening", &[("softening_mm2", a)])
+            .replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", &format!("waveform = \"step\"\nvoltages_v = [{volts:?}]\nat_s = 0.01"))
+            .replace("damping_eta = 0.008", "damping_eta = 0.0005");
+        let settings = ["simulation.duration_s=0.5", "simulation.time_step_s=5e-5", "simulation.record_every_s=5e-5", "material.gravity_m_s2=0"];
+        let r = run(&text, &settings).recording;
+        let z: Vec<f64> = (0..r.len()).map(|k| r.node(k, r.nodes() - 1)[2]).collect();
+        let turns: Vec<f64> = (1..z.len() - 1).filter(|k| (z[*k] - z[k - 1]) * (z[k + 1] - z[*k]) < 0.0).map(|k| r.time[k]).collect();
+        2.0 * (turns[turns.len() - 1] - turns[2]) / (turns.len() - 3) as f64
+    };
+    let ratio = |volts: f64| period(volts, 2000.0) / period(volts, 0.0);
+    let (small, large) = (ratio(-50.0), ratio(-800.0));
+    assert!((small - 1.0).abs() < 2e-3 && large > 1.005, "{small} {large}");
+}
+
+#[test]
+fn the_floor_returns_what_restitution_says() {
+    // A passive robot dropped flat: from the apex after the first bounce, h₁ = e² h₀.
+    let text = "[robot]\nmotors_per_actuator = 1\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0, 0, 0, 0]\n[simulation]\nengine = \"planar\"\n\
+        time_step_s = 1e-5\nduration_s = 0.35\nrecord_every_s = 1e-4\n";
+    use sfers::engine::{Engine, PlanarEngine};
+    let mut experiment = experiment::experiment(&Source::from_text("drop", with(text, "contact-restitution", &[("restitution", 0.5)]))).unwrap();
+    experiment.robot.extensions.restitution = 0.5;
+    let mut engine = PlanarEngine::new(&experiment.robot, 1e-5).unwrap();
+    let mut state = engine.save().unwrap();
+    // The centre of mass stands behind the bodies' angles and motions.
+    let bodies = experiment.robot.joints() + 1;
+    let height = 4 * bodies + 1;
+    state[height] += 2.0;
+    engine.load(0, &state).unwrap();
+    let (mut heights, mut before) = (Vec::new(), f64::INFINITY);
+    let mut rising = false;
+    for _ in 0..35_000 {
+        engine.prepare(&[0.0; 5]).unwrap();
+        engine.advance().unwrap();
+        let z = engine.save().unwrap()[height];
+        if rising && z < before {
+            heights.push(before);
+        }
+        rising = z > before;
+        before = z;
+    }
+    assert!((heights[0] / 0.5 - 1.0).abs() < 0.01, "{heights:?}");
+}
+
+#[test]
+fn what_cannot_be_applied_is_refused_by_name() {
+    for (id, values, word) in [
+        ("tip-weight", vec![], "sfers effects"),
+        ("tip-mass", vec![], "mass_g"),
+        ("tip-mass", vec![("mass_kg", 1.0)], "mass_kg"),
+        ("tip-mass", vec![("mass_g", -1.0)], "between"),
+        ("tip-mass", vec![("mass_g", 0.1), ("position_mm", 400.0)], "end"),
+        ("weak-actuator", vec![("actuator", 2.0), ("gain", 0.5)], "1 actuators"),
+        ("stiffness", vec![("scale", f64::NAN)], "between"),
+    ] {
+        let error = experiment::experiment(&Source::from_text("x.toml", with(CANTILEVER, id, &values))).unwrap_err().to_string();
+        assert!(error.contains(word) && error.contains("x.toml"), "{id}: {error}");
+    }
+    assert!(effects::find("hysteresis").is_some());
+}
+
+#[test]
+fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
+    let text = with(&with(CANTILEVER, "hysteresis", &[("width", 0.2)]), "creep", &[("per_decade", 0.02)]);
+    let text = with(&with(&text, "driver-lag", &[("time_constant_s", 0.01)]), "structural-damping", &[("loss_factor", 0.02)]);
+    let experiment = experiment::experiment(&Source::from_text("test", with(&text, "dry-friction", &[("moment_mn_m", 0.1)]))).unwrap();
+    let mut whole = experiment.engine().unwrap();
+    let full = experiment::run(&experiment, whole.as_mut(), |_| Control::Continue).unwrap();
+    let mut first = experiment.engine().unwrap();
+    let half = experiment::Experiment { steps: 1500, ..experiment.clone() };
+    experiment::run(&half, first.as_mut(), |_| Control::Continue).unwrap();
+    let mut second = experiment.engine().unwrap();
+    second.load(1500, &first.save().unwrap()).unwrap();
+    let rest = experiment::run(&experiment, second.as_mut(), |_| Control::Continue).unwrap();
+    assert_eq!(tip(&rest).to_bits(), tip(&full).to_bits());
+}
