@@ -68,7 +68,9 @@ fn near_its_off_value_an_effect_changes_little_and_further_off_more() {
                 .iter()
                 .map(|p| {
                     let value = match p.off {
-                        Some(off) => off + share * if p.bounds[1] > off { (p.bounds[1] - off).min(5.0) } else { p.bounds[0] - off },
+                        Some(off) => {
+                            off + share * if p.bounds[1] > off { (p.bounds[1] - off).min(5.0) } else { p.bounds[0] - off }
+                        }
                         None => p.default.filter(|value| value.is_finite()).unwrap_or(1.0),
                     };
                     (p.name, value)
@@ -79,15 +81,16 @@ fn near_its_off_value_an_effect_changes_little_and_further_off_more() {
             other.positions.iter().zip(&plain.positions).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
         let (small, large) = (moved(1e-3), moved(0.1));
-        // A single robot of one actuator has no other to be weaker than; a jump's landing may amplify.
         assert!(large > 1e-9, "{}: {small} {large}", effect.id);
-        assert!(small < 0.3 * large, "{}: {small} {large}", effect.id);
+        // A landing amplifies whatever changes before it.
+        assert!(effect.kind == Kind::Ground || small < 0.3 * large, "{}: {small} {large}", effect.id);
     }
 }
 
 #[test]
 fn limits_of_the_driver_act_beyond_them_only() {
-    let statics = CANTILEVER.replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", "waveform = \"dc\"\nvoltages_v = [-1000]");
+    let statics = CANTILEVER
+        .replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", "waveform = \"dc\"\nvoltages_v = [-1000]");
     let settings = ["simulation.duration_s=0.01"];
     let limited = |v: f64| tip(&run(&with(&statics, "saturation", &[("min_v", v)]), &settings));
     let half = statics.replace("[-1000]", "[-500]");
@@ -102,7 +105,8 @@ fn limits_of_the_driver_act_beyond_them_only() {
 #[test]
 fn a_clamp_that_gives_adds_its_turn_to_the_sag() {
     let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01"];
-    let [stiff, soft] = [0.0, 0.5].map(|c| tip(&run(&with(CANTILEVER, "clamp-compliance", &[("compliance_rad_per_n_m", c)]), &rest)));
+    let [stiff, soft] =
+        [0.0, 0.5].map(|c| tip(&run(&with(CANTILEVER, "clamp-compliance", &[("compliance_rad_per_n_m", c)]), &rest)));
     // The root moment is M g L/2; the turn c M g L/2 lowers the tip by L times it.
     let moment = 4.804359999999999 * 980.0 * 5.0;
     let expected = -0.5e-7 * moment * 10.0;
@@ -132,9 +136,13 @@ fn curvature_at_rest_bends_like_a_voltage_of_the_same_curvature() {
 /// Logarithmic decrements from cycle to cycle of a cantilever that rings down from a voltage step, and the amplitudes (cm) they belong to.
 fn decay(id: &str, values: &[(&str, f64)]) -> Vec<(f64, f64)> {
     let text = CANTILEVER
-        .replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", "waveform = \"step\"\nvoltages_v = [-600]\nat_s = 0.01")
+        .replace(
+            "waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5",
+            "waveform = \"step\"\nvoltages_v = [-600]\nat_s = 0.01",
+        )
         .replace("damping_eta = 0.008", "damping_eta = 0.001");
-    let settings = ["simulation.duration_s=0.8", "simulation.time_step_s=5e-5", "simulation.record_every_s=1e-4", "material.gravity_m_s2=0"];
+    let settings =
+        ["simulation.duration_s=0.8", "simulation.time_step_s=5e-5", "simulation.record_every_s=1e-4", "material.gravity_m_s2=0"];
     let r = run(&with(&text, id, values), &settings).recording;
     let z: Vec<f64> = (0..r.len()).map(|k| r.node(k, r.nodes() - 1)[2]).collect();
     // Of turning points, half the distance from one to the next.
@@ -181,7 +189,9 @@ fn a_structural_loss_damps_the_same_at_any_frequency() {
         let lag = |loss: f64| {
             let text = with(CANTILEVER, "structural-damping", &[("loss_factor", loss)]);
             let run = run(&text, &settings);
-            sfers::recording::measures::Measures::of(&run.recording, sfers::model::Mount::Clamped, Some(1.0 / frequency)).tip_phase_deg.unwrap()
+            sfers::recording::measures::Measures::of(&run.recording, sfers::model::Mount::Clamped, Some(1.0 / frequency))
+                .tip_phase_deg
+                .unwrap()
         };
         lag(0.0) - lag(0.02)
     };
@@ -195,12 +205,21 @@ fn a_structural_loss_damps_the_same_at_any_frequency() {
 fn softening_lowers_the_frequency_of_large_motion_only() {
     let period = |volts: f64, a: f64| {
         let text = with(CANTILEVER, "stiffness-softening", &[("softening_mm2", a)])
-            .replace("waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5", &format!("waveform = \"step\"\nvoltages_v = [{volts:?}]\nat_s = 0.01"))
+            .replace(
+                "waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5",
+                &format!("waveform = \"step\"\nvoltages_v = [{volts:?}]\nat_s = 0.01"),
+            )
             .replace("damping_eta = 0.008", "damping_eta = 0.0005");
-        let settings = ["simulation.duration_s=0.5", "simulation.time_step_s=5e-5", "simulation.record_every_s=5e-5", "material.gravity_m_s2=0"];
+        let settings = [
+            "simulation.duration_s=0.5",
+            "simulation.time_step_s=5e-5",
+            "simulation.record_every_s=5e-5",
+            "material.gravity_m_s2=0",
+        ];
         let r = run(&text, &settings).recording;
         let z: Vec<f64> = (0..r.len()).map(|k| r.node(k, r.nodes() - 1)[2]).collect();
-        let turns: Vec<f64> = (1..z.len() - 1).filter(|k| (z[*k] - z[k - 1]) * (z[k + 1] - z[*k]) < 0.0).map(|k| r.time[k]).collect();
+        let turns: Vec<f64> =
+            (1..z.len() - 1).filter(|k| (z[*k] - z[k - 1]) * (z[k + 1] - z[*k]) < 0.0).map(|k| r.time[k]).collect();
         2.0 * (turns[turns.len() - 1] - turns[2]) / (turns.len() - 3) as f64
     };
     let ratio = |volts: f64| period(volts, 2000.0) / period(volts, 0.0);
@@ -214,7 +233,8 @@ fn the_floor_returns_what_restitution_says() {
     let text = "[robot]\nmotors_per_actuator = 1\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0, 0, 0, 0]\n[simulation]\nengine = \"planar\"\n\
         time_step_s = 1e-5\nduration_s = 0.35\nrecord_every_s = 1e-4\n";
     use sfers::engine::{Engine, PlanarEngine};
-    let mut experiment = experiment::experiment(&Source::from_text("drop", with(text, "contact-restitution", &[("restitution", 0.5)]))).unwrap();
+    let mut experiment =
+        experiment::experiment(&Source::from_text("drop", with(text, "contact-restitution", &[("restitution", 0.5)]))).unwrap();
     experiment.robot.extensions.restitution = 0.5;
     let mut engine = PlanarEngine::new(&experiment.robot, 1e-5).unwrap();
     let mut state = engine.save().unwrap();
@@ -259,7 +279,8 @@ fn what_cannot_be_applied_is_refused_by_name() {
 fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     let text = with(&with(CANTILEVER, "hysteresis", &[("width", 0.2)]), "creep", &[("per_decade", 0.02)]);
     let text = with(&with(&text, "driver-lag", &[("time_constant_s", 0.01)]), "structural-damping", &[("loss_factor", 0.02)]);
-    let experiment = experiment::experiment(&Source::from_text("test", with(&text, "dry-friction", &[("moment_mn_m", 0.1)]))).unwrap();
+    let experiment =
+        experiment::experiment(&Source::from_text("test", with(&text, "dry-friction", &[("moment_mn_m", 0.1)]))).unwrap();
     let mut whole = experiment.engine().unwrap();
     let full = experiment::run(&experiment, whole.as_mut(), |_| Control::Continue).unwrap();
     let mut first = experiment.engine().unwrap();

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use thiserror::Error;
 
-use crate::experiment::{Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment};
+use crate::experiment::{
+    Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment,
+};
 use crate::model::Robot;
 
 /// Data that cannot be used as they are.
@@ -171,8 +173,10 @@ impl Dataset {
             source_name: path.display().to_string(),
             message: error.to_string().trim_end().into(),
         })?;
-        let line_of = |words: &str| text.lines().position(|line| line.trim_start().starts_with(words)).map_or(1, |at| at as u64 + 1);
-        let wrong = |words: &str, reason: String| DataError::Content { path: path.into(), line: line_of(words), column: 0, reason };
+        let line_of =
+            |words: &str| text.lines().position(|line| line.trim_start().starts_with(words)).map_or(1, |at| at as u64 + 1);
+        let wrong =
+            |words: &str, reason: String| DataError::Content { path: path.into(), line: line_of(words), column: 0, reason };
 
         let nominal = Config {
             material: description.material,
@@ -197,7 +201,10 @@ impl Dataset {
         let mut markers = Vec::new();
         for (name, position) in &description.markers {
             if !(0.0..=10.0 * length + 1e-9).contains(position) {
-                return Err(wrong(name, format!("marker {name} is at {position} mm, but the robot is {} mm long", 10.0 * length)));
+                return Err(wrong(
+                    name,
+                    format!("marker {name} is at {position} mm, but the robot is {} mm long", 10.0 * length),
+                ));
             }
             markers.push(Marker { name: name.clone(), position: 0.1 * position });
         }
@@ -227,7 +234,10 @@ impl Dataset {
         }
         for observation in &description.observation {
             if !(observation.sigma.is_finite() && observation.sigma > 0.0 && observation.value.is_finite()) {
-                return Err(wrong("[[observation]]", format!("{}: value and sigma must be numbers, sigma positive", observation.measure)));
+                return Err(wrong(
+                    "[[observation]]",
+                    format!("{}: value and sigma must be numbers, sigma positive", observation.measure),
+                ));
             }
         }
         let name = if description.dataset.name.is_empty() {
@@ -254,26 +264,26 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
     let mut config = nominal.clone();
     config.drive.waveform = Some("dc".into());
     config.drive.voltages_v = Some(vec![0.0; actuators.min(10_000)]);
-    let shown = toml::to_string(&config).map_err(|error| ConfigError::Syntax {
-        source_name: path.display().to_string(),
-        message: error.to_string(),
-    })?;
-    experiment(&Source::from_text(path.display().to_string(), shown)).map(|experiment| experiment.robot).map_err(|error| match error {
-        // The lines are those of the description, not of the experiment made of it.
-        ConfigError::Value { key, message, .. } => {
-            let name = key.rsplit('.').next().unwrap_or(&key);
-            let line = text.lines().position(|line| line.trim_start().starts_with(name)).map(|at| format!(", line {}", at + 1));
-            ConfigError::Value { place: format!("{}{}", path.display(), line.unwrap_or_default()), key, message }
+    let shown = toml::to_string(&config)
+        .map_err(|error| ConfigError::Syntax { source_name: path.display().to_string(), message: error.to_string() })?;
+    experiment(&Source::from_text(path.display().to_string(), shown)).map(|experiment| experiment.robot).map_err(|error| {
+        match error {
+            // The lines are those of the description, not of the experiment made of it.
+            ConfigError::Value { key, message, .. } => {
+                let name = key.rsplit('.').next().unwrap_or(&key);
+                let line =
+                    text.lines().position(|line| line.trim_start().starts_with(name)).map(|at| format!(", line {}", at + 1));
+                ConfigError::Value { place: format!("{}{}", path.display(), line.unwrap_or_default()), key, message }
+            }
+            other => other,
         }
-        other => other,
     })
 }
 
 type RunData = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>, Vec<String>);
 
 fn read_run(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<RunData, DataError> {
-    let bytes =
-        std::fs::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
+    let bytes = std::fs::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
     parse_run(&bytes, robot.actuators, markers).map_err(|Wrong { line, column, reason }| match line {
         0 => DataError::Unreadable { path: path.into(), reason },
         _ => DataError::Content { path: path.into(), line, column, reason },
@@ -294,8 +304,7 @@ fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunDa
     }
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let headers = reader.headers().map_err(|error| wrong(1, 0, error.to_string()))?.clone();
-    let names: Vec<String> =
-        markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}_mm", marker.name))).collect();
+    let names: Vec<String> = markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}_mm", marker.name))).collect();
     let mut time_column = None;
     let mut volt_columns = vec![None; actuators];
     let mut columns = vec![None; names.len()];
@@ -304,13 +313,15 @@ fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunDa
         let slot = if header == "t_s" {
             &mut time_column
         } else if let Some(n) = voltage {
-            let reason = format!("there is a voltage {header}, but the robot has {actuators} actuators; is this a run of another robot?");
+            let reason =
+                format!("there is a voltage {header}, but the robot has {actuators} actuators; is this a run of another robot?");
             n.checked_sub(1).and_then(|n| volt_columns.get_mut(n)).ok_or_else(|| wrong(1, at + 1, reason))?
         } else if let Some(n) = names.iter().position(|name| name == header) {
             &mut columns[n]
         } else {
             let known = markers.iter().map(|marker| marker.name.as_str()).collect::<Vec<_>>().join(", ");
-            let reason = format!("{header:?} is neither t_s, a voltage v1_v, ..., nor NAME_x_mm or NAME_z_mm of a marker ({known})");
+            let reason =
+                format!("{header:?} is neither t_s, a voltage v1_v, ..., nor NAME_x_mm or NAME_z_mm of a marker ({known})");
             return Err(wrong(1, at + 1, reason));
         };
         if slot.replace(at).is_some() {
@@ -340,7 +351,9 @@ fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunDa
         let number = |column: usize| {
             let text = record.get(column).unwrap_or_default();
             let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| wrong(line, column + 1, format!("{}: {text:?} is not a number", headers.get(column).unwrap_or_default())))
+            value.ok_or_else(|| {
+                wrong(line, column + 1, format!("{}: {text:?} is not a number", headers.get(column).unwrap_or_default()))
+            })
         };
         let time = number(time_column)?;
         if times.last().is_some_and(|last| time <= *last) {

@@ -108,7 +108,8 @@ impl<'a> Bench<'a> {
     /// Residuals and their derivatives by all coordinates, run by run.
     fn linearised(&self, model: &Model, runs: &[usize]) -> Result<(Vec<Residuals>, Vec<Vec<Residuals>>), String> {
         let places = places(model);
-        let tasks: Vec<(usize, usize)> = (0..=places.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
+        let tasks: Vec<(usize, usize)> =
+            (0..=places.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
         let results: Vec<Residuals> = tasks
             .par_iter()
             .map(|(column, run)| {
@@ -167,7 +168,8 @@ impl<'a> Bench<'a> {
             }
             loop {
                 // Coordinates that push against their bounds stay there.
-                let bounds = |k: usize| self.plant.candidates()[model.terms[places[k].0].candidate].parameters[places[k].1].bounds;
+                let bounds =
+                    |k: usize| self.plant.candidates()[model.terms[places[k].0].candidate].parameters[places[k].1].bounds;
                 let x = |k: usize| model.terms[places[k].0].x[places[k].1];
                 let held: Vec<bool> = (0..n)
                     .map(|k| {
@@ -201,7 +203,8 @@ impl<'a> Bench<'a> {
                     model = trial;
                     chi2 = found;
                     lambda = (lambda * 0.1).max(1e-9);
-                    if gain < ENOUGH * count as f64 || gain < enough * (found - count as f64).max(0.0).max(ENOUGH * count as f64) {
+                    if gain < ENOUGH * count as f64 || gain < enough * (found - count as f64).max(0.0).max(ENOUGH * count as f64)
+                    {
                         break 'rounds;
                     }
                     break;
@@ -238,7 +241,8 @@ impl<'a> Bench<'a> {
             let values = residuals[run].len();
             for from in (0..values).step_by(BLOCK) {
                 let to = (from + BLOCK).min(values);
-                let score = DVector::from_fn(n, |k, _| (from..to).map(|i| derivatives[k][run][i] * residuals[run][i]).sum::<f64>());
+                let score =
+                    DVector::from_fn(n, |k, _| (from..to).map(|i| derivatives[k][run][i] * residuals[run][i]).sum::<f64>());
                 meat += &score * score.transpose();
             }
         }
@@ -263,8 +267,10 @@ impl<'a> Bench<'a> {
             let channels = &self.plant.signals()[run].channels;
             for at in 0..residuals.len() {
                 let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(residuals.len());
-                let mut around: Vec<f64> =
-                    near.filter(|k| *k != at && channels[*k] == channels[at] && self.used[run][*k]).map(|k| residuals[k].abs()).collect();
+                let mut around: Vec<f64> = near
+                    .filter(|k| *k != at && channels[*k] == channels[at] && self.used[run][*k])
+                    .map(|k| residuals[k].abs())
+                    .collect();
                 around.sort_by(f64::total_cmp);
                 // Beyond what three quarters of the neighbours show, so that a true jump or peak stays.
                 let usual = around.get(3 * around.len() / 4).copied().unwrap_or(f64::INFINITY);
@@ -307,9 +313,16 @@ impl<'a> Bench<'a> {
                 let n = shares.len();
                 let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
                 let gradient: Vec<f64> = columns.iter().map(|column| inner(column, &plain)).collect();
-                let held: Vec<bool> = (0..n).map(|k| (shares[k] >= 1.0 && gradient[k] < 0.0) || (shares[k] <= 0.0 && gradient[k] > 0.0)).collect();
+                let held: Vec<bool> =
+                    (0..n).map(|k| (shares[k] >= 1.0 && gradient[k] < 0.0) || (shares[k] <= 0.0 && gradient[k] > 0.0)).collect();
                 let matrix = DMatrix::from_fn(n, n, |i, j| {
-                    if i == j { 1e-9 + inner(&columns[i], &columns[i]) } else if held[i] || held[j] { 0.0 } else { inner(&columns[i], &columns[j]) }
+                    if i == j {
+                        1e-9 + inner(&columns[i], &columns[i])
+                    } else if held[i] || held[j] {
+                        0.0
+                    } else {
+                        inner(&columns[i], &columns[j])
+                    }
                 });
                 let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
                 let Some(step) = matrix.lu().solve(&right) else { break };

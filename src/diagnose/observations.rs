@@ -37,7 +37,8 @@ fn config(dataset: &Dataset, observation: &Observation) -> Result<Config, String
     let text = |error: &dyn std::fmt::Display| format!("{}: {error}", observation.measure);
     let value = |v: Result<toml::Value, toml::ser::Error>| v.map_err(|error| text(&error));
     let robot = merged(value(toml::Value::try_from(&dataset.nominal.robot))?, value(toml::Value::try_from(&observation.robot))?);
-    let material = merged(value(toml::Value::try_from(&dataset.nominal.material))?, value(toml::Value::try_from(&observation.material))?);
+    let material =
+        merged(value(toml::Value::try_from(&dataset.nominal.material))?, value(toml::Value::try_from(&observation.material))?);
     let mut config = Config {
         robot: robot.try_into().map_err(|error: toml::de::Error| text(&error))?,
         material: material.try_into().map_err(|error: toml::de::Error| text(&error))?,
@@ -95,7 +96,8 @@ impl Plant for Numbers<'_> {
             config.effect.push(EffectConfig { id: candidate.id.into(), parameters });
         }
         let text = toml::to_string(&config).map_err(|error| error.to_string())?;
-        let experiment = experiment::experiment(&Source::from_text(&observation.measure, text)).map_err(|error| error.to_string())?;
+        let experiment =
+            experiment::experiment(&Source::from_text(&observation.measure, text)).map_err(|error| error.to_string())?;
         let mut engine = experiment.engine().map_err(|error| error.to_string())?;
         let done = experiment::run(&experiment, engine.as_mut(), |_| Control::Continue).map_err(|error| error.to_string())?;
         let measures = Measures::of(&done.recording, experiment.robot.mount, experiment.drive.period());
@@ -156,7 +158,8 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
     let mut explained = if single.is_empty() { pairs } else { single };
     explained.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let fine = nominal.chi2 <= EXPLAINED * count;
-    let name = |fit: &Fit| fit.model.terms.iter().map(|term| plant.candidates[term.candidate].id).collect::<Vec<_>>().join(" with ");
+    let name =
+        |fit: &Fit| fit.model.terms.iter().map(|term| plant.candidates[term.candidate].id).collect::<Vec<_>>().join(" with ");
     let effects: Vec<Adopted> = if fine {
         Vec::new()
     } else {
@@ -167,7 +170,8 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
                     let c = &plant.candidates[term.candidate];
                     let spread = 1.96 * super::search::covariance(&fit.information)[(index, index)].sqrt();
                     let free = &c.parameters[0];
-                    let ends = [term.x[0] - spread, term.x[0] + spread].map(|x| free.value(x.clamp(free.bounds[0], free.bounds[1])));
+                    let ends =
+                        [term.x[0] - spread, term.x[0] + spread].map(|x| free.value(x.clamp(free.bounds[0], free.bounds[1])));
                     Adopted {
                         id: c.id.into(),
                         kind: c.kind.into(),
@@ -176,7 +180,8 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
                             name: free.name.into(),
                             value: free.value(term.x[0]),
                             unit: free.unit.into(),
-                            ci95: [Some(ends[0].min(ends[1])), Some(ends[0].max(ends[1]))].map(|end| end.filter(|x: &f64| x.is_finite())),
+                            ci95: [Some(ends[0].min(ends[1])), Some(ends[0].max(ends[1]))]
+                                .map(|end| end.filter(|x: &f64| x.is_finite())),
                             at_bound: term.x[0] <= free.bounds[0] || term.x[0] >= free.bounds[1],
                         }],
                         tied_with: Vec::new(),
@@ -205,13 +210,22 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
             rmse_mm: r[0].abs() * signal.sigmas[0],
             rmse_noises: r[0].abs(),
         });
-        Ok(Stage { runs: runs.collect(), rmse_mm: 0.0, rmse_heldout_mm: 0.0, rmse_heldout_ci95_mm: [0.0; 2], residual_tests: Vec::new(), parameters: Vec::new() })
+        Ok(Stage {
+            runs: runs.collect(),
+            rmse_mm: 0.0,
+            rmse_heldout_mm: 0.0,
+            rmse_heldout_ci95_mm: [0.0; 2],
+            residual_tests: Vec::new(),
+            parameters: Vec::new(),
+        })
     };
     let list = explained.iter().map(&name).collect::<Vec<_>>().join("; ");
     let summary = match verdict {
         Verdict::None => "The nominal model reaches all numbers within two standard deviations.".to_owned(),
         Verdict::Unexplained => "No single cause and no two constants of the nominal model reach all numbers.".to_owned(),
-        _ => format!("The nominal model misses the numbers; these would reach them, and the numbers cannot tell which it is: {list}."),
+        _ => format!(
+            "The nominal model misses the numbers; these would reach them, and the numbers cannot tell which it is: {list}."
+        ),
     };
     let mut ranked: Vec<&Fit> = fits.iter().collect();
     ranked.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));

@@ -28,11 +28,22 @@ fn protocols(plant: &RobotPlant) -> Vec<Protocol> {
     let n = robot.actuators;
     let length = 10.0 * robot.material.actuator_length * n as f64;
     let all = |duration: f64, volts: &dyn Fn(f64) -> f64| table(n, duration, |t, _| volts(t));
-    let scene = |drive: Table, duration: f64| Scene { drive, duration, hung: 0.0, added: 0.0, turned_over: false, markers: plant.markers().to_vec() };
-    let sine = |amplitude: f64, frequency: f64| move |t: f64| 0.5 * amplitude * (1.0 - (2.0 * std::f64::consts::PI * frequency * t).cos());
-    let triangle = |period: f64| move |t: f64| {
-        let phase = (t / period).fract();
-        -500.0 + 950.0 * (4.0 * (phase - 0.5).abs() - 1.0)
+    let scene = |drive: Table, duration: f64| Scene {
+        drive,
+        duration,
+        hung: 0.0,
+        added: 0.0,
+        turned_over: false,
+        markers: plant.markers().to_vec(),
+    };
+    let sine = |amplitude: f64, frequency: f64| {
+        move |t: f64| 0.5 * amplitude * (1.0 - (2.0 * std::f64::consts::PI * frequency * t).cos())
+    };
+    let triangle = |period: f64| {
+        move |t: f64| {
+            let phase = (t / period).fract();
+            -500.0 + 950.0 * (4.0 * (phase - 0.5).abs() - 1.0)
+        }
     };
     let step = |t: f64| if t < 0.1 { 0.0 } else { -1000.0 };
     let f1 = crate::analytic::cantilever_frequency(robot) / (n as f64).powi(2);
@@ -50,7 +61,10 @@ fn protocols(plant: &RobotPlant) -> Vec<Protocol> {
             text: "one actuator at a time, with markers every 25 mm".into(),
             scene: Scene {
                 markers: (1..=4 * n).map(|k| 0.1 * length * k as f64 / (4 * n) as f64).collect(),
-                ..scene(table(n, 2.0 * n as f64, |t, a| if (t / 2.0) as usize == a { sine(-1000.0, 1.0)(t) } else { 0.0 }), 2.0 * n as f64)
+                ..scene(
+                    table(n, 2.0 * n as f64, |t, a| if (t / 2.0) as usize == a { sine(-1000.0, 1.0)(t) } else { 0.0 }),
+                    2.0 * n as f64,
+                )
             },
         },
     ];
@@ -65,7 +79,9 @@ fn protocols(plant: &RobotPlant) -> Vec<Protocol> {
             scene: Scene { hung: 2.0, ..scene(all(1.0, &|_| 0.0), 1.0) },
         });
         list.push(Protocol {
-            text: "turn the sheet over and film its shape at 0 V, with markers every 25 mm, a plumb line and a ruler in the picture".into(),
+            text:
+                "turn the sheet over and film its shape at 0 V, with markers every 25 mm, a plumb line and a ruler in the picture"
+                    .into(),
             scene: Scene {
                 turned_over: true,
                 markers: (1..=4 * n).map(|k| 0.1 * length * k as f64 / (4 * n) as f64).collect(),

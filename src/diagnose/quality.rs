@@ -71,7 +71,15 @@ pub fn check(dataset: &Dataset) -> Checked {
         .noise
         .iter()
         .zip(&estimated)
-        .map(|(given, own)| given.unwrap_or(if *own > 0.0 { *own } else if fallback.is_finite() { fallback } else { 1e-3 }))
+        .map(|(given, own)| {
+            given.unwrap_or(if *own > 0.0 {
+                *own
+            } else if fallback.is_finite() {
+                fallback
+            } else {
+                1e-3
+            })
+        })
         .collect();
     for (name, (given, own)) in names.iter().zip(dataset.noise.iter().zip(&estimated)) {
         if let Some(given) = given
@@ -100,7 +108,10 @@ pub fn check(dataset: &Dataset) -> Checked {
         }
         let stuck = stuck(run, &noise, &mut masks);
         for (channel, rows) in stuck {
-            remarks.push(format!("run {}: {} stands still for {rows} rows while others move; they are left out", run.id, names[channel]));
+            remarks.push(format!(
+                "run {}: {} stands still for {rows} rows while others move; they are left out",
+                run.id, names[channel]
+            ));
         }
         runs.push(masks);
     }

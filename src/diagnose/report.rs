@@ -110,7 +110,10 @@ fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
         );
     }
     out.push_str("</table>\n");
-    let _ = writeln!(out, "<table><tr><th>run</th><th>role</th><th>nominal ({unit})</th><th>re-tuned</th><th>extended</th><th>in noises</th></tr>");
+    let _ = writeln!(
+        out,
+        "<table><tr><th>run</th><th>role</th><th>nominal ({unit})</th><th>re-tuned</th><th>extended</th><th>in noises</th></tr>"
+    );
     for ((nominal, tuned), extended) in d.baseline.runs.iter().zip(&d.calibrated.runs).zip(&d.extended.runs) {
         let class = if extended.rmse_noises > 1.2 { " bad" } else { "" };
         let _ = writeln!(
@@ -130,7 +133,9 @@ fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
 /// The channel with the largest residual.
 fn loudest(signal: &Signal, residuals: &[f64]) -> usize {
     let channels = signal.channels.iter().copied().max().unwrap_or(0) + 1;
-    let size = |channel: usize| -> f64 { residuals.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(r, _)| r * r).sum() };
+    let size = |channel: usize| -> f64 {
+        residuals.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(r, _)| r * r).sum()
+    };
     (0..channels).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
 }
 
@@ -153,7 +158,8 @@ fn motion(out: &mut String, outcome: &Outcome, run: usize, signal: &Signal, chan
         let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", label);
         let used = |i: &&usize| outcome.used[run][**i];
         f.series("measured", rows.iter().filter(used).map(|i| (signal.times[*i], signal.values[*i])), Mark::Line);
-        let simulated = rows.iter().filter(used).map(|i| (signal.times[*i], signal.values[*i] - residuals[*i] * signal.sigmas[*i]));
+        let simulated =
+            rows.iter().filter(used).map(|i| (signal.times[*i], signal.values[*i] - residuals[*i] * signal.sigmas[*i]));
         f.series(kind, simulated, Mark::Line);
         figure(out, &format!("motion-{kind}-{index}"), &f);
     }
@@ -176,7 +182,11 @@ fn ranking(out: &mut String, d: &Diagnosis, unit: &str) {
         "<h2>Candidates, on top of re-tuned constants</h2>\n<table><tr><th>cause</th><th>held-out error ({unit})</th><th>change of BIC</th></tr>"
     );
     for c in d.candidates.iter().take(CANDIDATES) {
-        let _ = writeln!(out, "<tr><td>{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{:.0}</td></tr>", c.id, c.rmse_heldout_mm, c.delta_bic);
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{:.0}</td></tr>",
+            c.id, c.rmse_heldout_mm, c.delta_bic
+        );
     }
     out.push_str("</table>\n<p class=\"small\">Those that a linear estimate puts first; the others would do less.</p>\n");
 }
@@ -203,7 +213,8 @@ fn parameters(out: &mut String, d: &Diagnosis) {
     }
     out.push_str("</table>\n");
     for effect in &d.effects {
-        let tied = if effect.tied_with.is_empty() { String::new() } else { format!(" Tied with {}.", effect.tied_with.join(", ")) };
+        let tied =
+            if effect.tied_with.is_empty() { String::new() } else { format!(" Tied with {}.", effect.tied_with.join(", ")) };
         let _ = writeln!(
             out,
             "<p class=\"small\"><strong>{}</strong> ({}): {} It removes {:.1} % of the held-out error above the noise.{tied}</p>",
@@ -219,7 +230,8 @@ fn parameters(out: &mut String, d: &Diagnosis) {
     }
     out.push_str("</table>\n");
     for c in &d.correlations {
-        let _ = writeln!(out, "<p class=\"bad\">{} and {} are correlated by {:.3}.</p>", c.between[0], c.between[1], c.coefficient);
+        let _ =
+            writeln!(out, "<p class=\"bad\">{} and {} are correlated by {:.3}.</p>", c.between[0], c.between[1], c.coefficient);
     }
     let _ = writeln!(out, "<p class=\"small\">Condition of the fit: {:.1e}.</p>", d.condition);
 }
@@ -237,7 +249,8 @@ fn tests(out: &mut String, d: &Diagnosis) {
     );
     out.push_str("<table><tr><th>run</th><th>test</th><th>nominal</th><th>re-tuned</th><th>extended</th><th>limit</th><th>what it means, before and after</th></tr>\n");
     for ((a, b), c) in d.baseline.residual_tests.iter().zip(&d.calibrated.residual_tests).zip(&d.extended.residual_tests) {
-        let cell = |passed: bool, statistic: f64| format!("<td class=\"n{}\">{statistic:.3}</td>", if passed { "" } else { " bad" });
+        let cell =
+            |passed: bool, statistic: f64| format!("<td class=\"n{}\">{statistic:.3}</td>", if passed { "" } else { " bad" });
         let _ = writeln!(
             out,
             "<tr><td>{}</td><td>{}</td>{}{}{}<td class=\"n\">{:.3}</td><td>{}; {}</td></tr>",

@@ -112,9 +112,7 @@ impl RobotPlant {
         let finest = self.steps[run];
         let limit = 0.09 / (analytic::cantilever_frequency(&self.robot) * (self.robot.actuators as f64).powi(2));
         let ends = vec![1.0; self.unknowns(run)];
-        let with = |step: f64| {
-            self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok()
-        };
+        let with = |step: f64| self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok();
         let (Some(fine), Mount::Clamped) = (with(finest), self.robot.mount) else { return finest };
         let sigmas = &self.signals[run].sigmas;
         let mut best = finest;
@@ -177,7 +175,8 @@ impl RobotPlant {
         let path = Path::new(&effects, robot.actuators, scene.duration);
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
         let step = self.steps.iter().copied().fold(1e-3, f64::min);
-        let tracks = track_from(&robot, scene.hung, &drive, path, step, &scene.markers, &times).map_err(|error| error.to_string())?;
+        let tracks =
+            track_from(&robot, scene.hung, &drive, path, step, &scene.markers, &times).map_err(|error| error.to_string())?;
         Ok(tracks.into_iter().flat_map(|at| view.of(at).map(|x| 10.0 * x)).collect())
     }
 
@@ -280,11 +279,9 @@ pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
                 ),
             ],
             "creep" => vec![one("per_decade", 0.02, &[0.02])],
-            "field-dependent-gain" => vec![(
-                vec![("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)],
-                vec![vec![0.05, 0.0]],
-                Vec::new(),
-            )],
+            "field-dependent-gain" => {
+                vec![(vec![("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)], vec![vec![0.05, 0.0]], Vec::new())]
+            }
             "polarity-asymmetry" => vec![one("ratio", 0.2, &[1.2])],
             "weak-actuator" => {
                 (1..=robot.actuators).map(|j| (vec![("gain", 0.1)], vec![vec![0.8]], vec![("actuator", j as f64)])).collect()
@@ -365,14 +362,7 @@ impl Plant for RobotPlant {
 }
 
 impl RobotPlant {
-    fn predict_with(
-        &self,
-        terms: &[Term],
-        resolution: f64,
-        run: usize,
-        unknowns: &[f64],
-        step: f64,
-    ) -> Result<Vec<f64>, String> {
+    fn predict_with(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64], step: f64) -> Result<Vec<f64>, String> {
         let effects = terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
         let mut robot = self.robot.clone();
         robot.motors_per_actuator = resolution as usize;
@@ -466,17 +456,13 @@ fn track_from(
                 let (a, b) = (of[3 * body + axis], of[3 * body + 3 + axis]);
                 a + share * (b - a)
             };
-            out.push([
-                between(&positions, 0) - origin,
-                between(&positions, 2),
-                between(&velocities, 0),
-                between(&velocities, 2),
-            ]);
+            out.push([between(&positions, 0) - origin, between(&positions, 2), between(&velocities, 0), between(&velocities, 2)]);
         }
         Ok(())
     };
     let (mut before, mut after): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
     let mut tracks = Vec::with_capacity(times.len() * markers.len());
+    let (parts, mut piece) = (path.parts(), vec![0.0; n]);
     let (mut step, mut next) = (0_u64, 0);
     while next < times.len() {
         let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
@@ -493,8 +479,18 @@ fn track_from(
                 break;
             }
         }
-        drive.mean(from, to, &mut start, &mut volts);
-        path.pass(h, &mut volts);
+        if parts == 1 {
+            drive.mean(from, to, &mut start, &mut volts);
+            path.pass(h, &mut volts);
+        } else {
+            volts.fill(0.0);
+            for part in 0..parts {
+                let [a, b] = [part, part + 1].map(|k| from + h * k as f64 / parts as f64);
+                drive.mean(a, b, &mut start, &mut piece);
+                path.pass(h / parts as f64, &mut piece);
+                volts.iter_mut().zip(&piece).for_each(|(sum, v)| *sum += v / parts as f64);
+            }
+        }
         engine.prepare(&volts)?;
         engine.advance()?;
         step += 1;

@@ -165,7 +165,9 @@ impl Search<'_> {
         let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
         let (sigmas, gain) = self.gap(more, less, runs);
         let count = self.bench.count(runs) as f64;
-        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && sigmas > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
+        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
+            && sigmas > LEAST_SIGMAS
+            && more.bic() < less.bic() - LEAST_BIC
     }
 
     /// Whether two models cannot be told apart by any run.
@@ -178,14 +180,17 @@ impl Search<'_> {
         // Areal mass enters all motion only by its ratio to the stiffness: one of the two is enough.
         let candidates = self.bench.plant.candidates().iter().enumerate();
         let constants = candidates.filter(|(_, c)| c.is_constant && c.id != "areal-mass");
-        constants.map(|(candidate, c)| Term { candidate, x: c.parameters.iter().map(|p| p.off.unwrap_or(p.bounds[0])).collect() }).collect()
+        constants
+            .map(|(candidate, c)| Term { candidate, x: c.parameters.iter().map(|p| p.off.unwrap_or(p.bounds[0])).collect() })
+            .collect()
     }
 
     /// The nominal model with its constants free.
     pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, String> {
         let scored = self.fitted(&Model { terms: self.constants(), resolution, fine: false })?;
         let scored = self.settle(scored)?;
-        let (chi2, runs) = if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) };
+        let (chi2, runs) =
+            if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) };
         self.unexplained = (chi2 / self.bench.count(runs).max(1) as f64 - 1.0).max(0.0);
         Ok(scored)
     }
@@ -224,10 +229,15 @@ impl Search<'_> {
             let along = -rest.dot(&column) / length;
             let mut model = base.clone();
             let c = &candidates[term.candidate];
-            let x: Vec<f64> = term.x.iter().zip(&c.parameters).map(|(x, p)| match p.off {
-                Some(off) => (off + along.clamp(-1.5, 2.0) * (x - off)).clamp(p.bounds[0], p.bounds[1]),
-                None => *x,
-            }).collect();
+            let x: Vec<f64> = term
+                .x
+                .iter()
+                .zip(&c.parameters)
+                .map(|(x, p)| match p.off {
+                    Some(off) => (off + along.clamp(-1.5, 2.0) * (x - off)).clamp(p.bounds[0], p.bounds[1]),
+                    None => *x,
+                })
+                .collect();
             let one_sided = c.parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1]));
             // A cause that is asked for with the wrong sign starts where it was tried.
             let wrong = one_sided && along < 0.05;
@@ -346,9 +356,10 @@ impl Search<'_> {
             let removed = model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             let without = self.fitted(&model)?;
-            let screened = self.screen(&without)?.into_iter().filter(|(_, m)| {
-                m.terms.last().is_some_and(|term| term.candidate != removed.candidate)
-            });
+            let screened = self
+                .screen(&without)?
+                .into_iter()
+                .filter(|(_, m)| m.terms.last().is_some_and(|term| term.candidate != removed.candidate));
             for model in self.finalists(screened.collect(), most) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
@@ -415,7 +426,13 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     }
     DMatrix::from_fn(n, n, |i, j| {
         let by = scale[i] * scale[j];
-        if by > 0.0 { result[(i, j)] / by } else if i == j { f64::INFINITY } else { 0.0 }
+        if by > 0.0 {
+            result[(i, j)] / by
+        } else if i == j {
+            f64::INFINITY
+        } else {
+            0.0
+        }
     })
 }
 
@@ -472,7 +489,8 @@ struct Pace {
 
 impl Pace {
     fn of(run: usize, signal: &Signal) -> Self {
-        let (low, high) = signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+        let (low, high) =
+            signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
         let range = (high - low).max(1e-9);
         let (mut way, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
         for (u, t) in signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]) {

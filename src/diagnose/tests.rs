@@ -124,10 +124,22 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
         add("correlation with the input", along, limit, "independent of the input", "follows the input: a gain is off");
         let rates: Vec<f64> = trace.inputs.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let beside = correlation(&trace.values[1..], &rates);
-        add("correlation with the input's rate", beside, limit, "independent of the rate", "follows the rate of the input: a lag, a loop or a loss is off");
+        add(
+            "correlation with the input's rate",
+            beside,
+            limit,
+            "independent of the rate",
+            "follows the rate of the input: a lag, a loop or a loss is off",
+        );
         let logs: Vec<f64> = trace.times.iter().map(|t| (t + 0.01).log10()).collect();
         let drift = correlation(&trace.values, &logs);
-        add("drift in log time", drift, limit, "does not drift", "drifts with the logarithm of time: creep, or a set-up that moves");
+        add(
+            "drift in log time",
+            drift,
+            limit,
+            "does not drift",
+            "drifts with the logarithm of time: creep, or a set-up that moves",
+        );
         if let Some(frequency) = input_frequency(&trace.times, &trace.inputs) {
             // An amplitude of noise of unit variance is about √(π/m); one in a thousand is above √(4 ln 1000/m).
             let limit = (4.0 * 1000_f64.ln() / m).sqrt();
@@ -141,7 +153,13 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
                 add(name, size, limit, "no distortion", bad);
             }
             let area = loop_area(&trace);
-            add("loop area", area, 3.3 * (0.5 / m).sqrt(), "no loop over the input", "a loop over the input: loss, lag or memory");
+            add(
+                "loop area",
+                area,
+                3.3 * (0.5 / m).sqrt(),
+                "no loop over the input",
+                "a loop over the input: loss, lag or memory",
+            );
         }
         let measured: Vec<f64> = {
             let rows: Vec<usize> = (0..r.len()).collect();
@@ -166,7 +184,12 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
             statistic: trend,
             limit: (3.3 / (ratios.len() as f64).sqrt()).min(0.9),
             passed: worst < 4.0 || trend.abs() < (3.3 / (ratios.len() as f64).sqrt()).min(0.9),
-            meaning: if worst < 4.0 { "the same gain in all runs" } else { "measured over simulated motion, correlated with the input's swing" }.into(),
+            meaning: if worst < 4.0 {
+                "the same gain in all runs"
+            } else {
+                "measured over simulated motion, correlated with the input's swing"
+            }
+            .into(),
         });
     }
     tests
@@ -176,7 +199,9 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
 fn centred(signal: &Signal, values: &[f64]) -> Vec<f64> {
     let channels = signal.channels.iter().copied().max().unwrap_or(0) + 1;
     let means: Vec<f64> = (0..channels)
-        .map(|channel| mean(&values.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(v, _)| *v).collect::<Vec<_>>()))
+        .map(|channel| {
+            mean(&values.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(v, _)| *v).collect::<Vec<_>>())
+        })
         .collect();
     values.iter().zip(&signal.channels).map(|(v, channel)| v - means[*channel]).collect()
 }
@@ -224,14 +249,20 @@ pub fn describe(plant: &dyn Plant, split: &Split, residuals: &[Residuals]) -> Ve
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let mut parts = Vec::new();
         if m.abs() > 0.7 * rms {
-            parts.push(format!("one-sided: {} by {:.1} times the noise on average", if m > 0.0 { "measured above simulated" } else { "measured below simulated" }, m.abs()));
+            parts.push(format!(
+                "one-sided: {} by {:.1} times the noise on average",
+                if m > 0.0 { "measured above simulated" } else { "measured below simulated" },
+                m.abs()
+            ));
         }
         if let Some((frequency, size)) = best
             && size * size / 2.0 > 0.3 * rms * rms
         {
             let drive = input_frequency(&trace.times, &trace.inputs);
             let relation = match drive {
-                Some(drive) if ((frequency / drive).round() * drive - frequency).abs() < 1.5 / span && frequency > 0.5 * drive => {
+                Some(drive)
+                    if ((frequency / drive).round() * drive - frequency).abs() < 1.5 / span && frequency > 0.5 * drive =>
+                {
                     format!(", {} times the drive's", (frequency / drive).round())
                 }
                 Some(_) => ", unrelated to the drive".into(),
@@ -260,7 +291,14 @@ pub fn describe(plant: &dyn Plant, split: &Split, residuals: &[Residuals]) -> Ve
 /// Where the mean before and after differ most, and by how much.
 fn largest_step(trace: &Trace) -> Option<(f64, f64)> {
     let n = trace.values.len();
-    let sums: Vec<f64> = trace.values.iter().scan(0.0, |sum, v| { *sum += v; Some(*sum) }).collect();
+    let sums: Vec<f64> = trace
+        .values
+        .iter()
+        .scan(0.0, |sum, v| {
+            *sum += v;
+            Some(*sum)
+        })
+        .collect();
     let total = *sums.last()?;
     (n / 10..n - n / 10)
         .map(|i| (trace.times[i], (total - sums[i]) / (n - i - 1) as f64 - sums[i] / (i + 1) as f64))

@@ -210,7 +210,12 @@ pub fn diagnose(
         calibrated = search.calibrated(start)?;
     }
     let poor = poverty(plant, &search.split);
-    let (mut best, trials) = if poor.is_some() { (calibrated.clone(), Vec::new()) } else { search.forward(calibrated.clone())? };
+    // Data that cannot tell causes apart get none.
+    let (mut best, trials) = if poor.is_some() {
+        (search.fitted(&Model { terms: Vec::new(), ..calibrated.model().clone() })?, Vec::new())
+    } else {
+        search.forward(calibrated.clone())?
+    };
     let more = search.bench.leave_out_spikes(best.model())?;
     if more > 0 {
         best = search.settle(best)?;
@@ -261,7 +266,11 @@ pub fn diagnose(
     let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
     if unnamed && !best.model().terms.is_empty() {
         let names: Vec<_> = best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
-        remarks.push(format!("nothing is named: the nearest, {}, leaves {:.0} % of the misfit", names.join(" with "), 100.0 * unexplained_fraction));
+        remarks.push(format!(
+            "nothing is named: the nearest, {}, leaves {:.0} % of the misfit",
+            names.join(" with "),
+            100.0 * unexplained_fraction
+        ));
         best = bare.clone();
     }
 
@@ -302,7 +311,8 @@ pub fn diagnose(
     if let Some(poor) = &poor {
         remarks.push(poor.clone());
     }
-    let models: Vec<Model> = std::iter::once(best.model().clone()).chain(tied.iter().map(|(_, t)| t.scored.model().clone())).collect();
+    let models: Vec<Model> =
+        std::iter::once(best.model().clone()).chain(tied.iter().map(|(_, t)| t.scored.model().clone())).collect();
     let next_experiment = if verdict == Verdict::Tied { separate(&models) } else { None };
     let unexplained = if is_unexplained { super::tests::describe(plant, &search.split, &best.residuals) } else { Vec::new() };
 
@@ -353,7 +363,10 @@ pub fn diagnose(
 fn poverty(plant: &dyn Plant, split: &Split) -> Option<String> {
     let signals = plant.signals();
     if signals.len() < 2 || split.held.is_empty() {
-        return Some(format!("{} run is too little to tell causes apart: a cause has to be judged on a run that it was not fitted to", signals.len()));
+        return Some(format!(
+            "{} run is too little to tell causes apart: a cause has to be judged on a run that it was not fitted to",
+            signals.len()
+        ));
     }
     let still = |run: &usize| {
         let inputs = &signals[*run].inputs;
@@ -410,7 +423,8 @@ fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -> Result<In
                 }
             }
             reach = reach.hypot(numerics.get(k).copied().unwrap_or(0.0));
-            sides[side] = if reach.is_finite() { (x + sign * reach).clamp(free.bounds[0], free.bounds[1]) } else { free.bounds[side] };
+            sides[side] =
+                if reach.is_finite() { (x + sign * reach).clamp(free.bounds[0], free.bounds[1]) } else { free.bounds[side] };
         }
         ends.push(sides);
         for j in 0..k {
@@ -633,7 +647,10 @@ fn summary(verdict: Verdict, effects: &[Adopted], left: f64, poor: Option<&str>,
         Verdict::Unexplained => match (poor, physics.is_empty()) {
             (Some(poor), _) => format!("The nominal model does not explain the data, and {poor}."),
             (None, true) => "Something is wrong that nothing in the library explains.".into(),
-            (None, false) => format!("{names} explains a part, but {:.0} % of the misfit is left that nothing in the library explains.", 100.0 * left),
+            (None, false) => format!(
+                "{names} explains a part, but {:.0} % of the misfit is left that nothing in the library explains.",
+                100.0 * left
+            ),
         },
     }
 }

@@ -32,7 +32,8 @@ impl Command {
     /// Looks for the jumps of a command: rising times (s) and voltages (V), row after row, one per actuator.
     pub fn new(times: &[f64], volts: &[f64], actuators: usize) -> Self {
         let rows = times.len();
-        let change = |row: usize, actuator: usize| (volts[(row + 1) * actuators + actuator] - volts[row * actuators + actuator]).abs();
+        let change =
+            |row: usize, actuator: usize| (volts[(row + 1) * actuators + actuator] - volts[row * actuators + actuator]).abs();
         let is_jump = |row: usize| {
             (0..actuators).any(|a| {
                 let before = if row > 0 { change(row - 1, a) } else { 0.0 };

@@ -155,7 +155,8 @@ mod tests {
 
     #[test]
     fn the_mean_over_a_step_counts_a_jump_from_its_moment_on() {
-        let drive = Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0, delay: 0.0 };
+        let drive =
+            Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0, delay: 0.0 };
         let (mut start, mut mean) = (vec![0.0; 2], vec![f64::NAN; 2]);
         drive.mean(0.0, 0.1, &mut start, &mut mean);
         assert_eq!(mean, [0.0, 0.0]);

@@ -10,6 +10,11 @@ pub trait Voltages: Send {
     /// Turns the mean voltages of a step of `dt` (s) into what comes out.
     fn pass(&mut self, dt: f64, volts: &mut [f64]);
 
+    /// Into how many parts a step is better cut where the voltage may jump within it.
+    fn parts(&self) -> usize {
+        1
+    }
+
     /// Its memory, as numbers for storing.
     fn memory(&self) -> Vec<f64> {
         Vec::new()
@@ -27,7 +32,8 @@ pub struct Path {
 impl Path {
     /// The way through `effects` for a robot of `actuators` actuators in a run of `duration` (s).
     pub fn new(effects: &[Applied], actuators: usize, duration: f64) -> Self {
-        let of = |id: &str| effects.iter().filter(move |applied| applied.effect.id == id && !applied.is_off()).collect::<Vec<_>>();
+        let of =
+            |id: &str| effects.iter().filter(move |applied| applied.effect.id == id && !applied.is_off()).collect::<Vec<_>>();
         let stages = EFFECTS.iter().flat_map(|effect| of(effect.id)).filter_map(|applied| match applied.effect.action {
             Action::Voltages(make) => Some(make(&applied.values, actuators, duration)),
             _ => None,
@@ -48,6 +54,11 @@ impl Path {
     /// Passes on a step's mean voltages.
     pub fn pass(&mut self, dt: f64, volts: &mut [f64]) {
         self.stages.iter_mut().for_each(|stage| stage.pass(dt, volts));
+    }
+
+    /// Into how many parts steps are better cut.
+    pub fn parts(&self) -> usize {
+        self.stages.iter().map(|stage| stage.parts()).max().unwrap_or(1)
     }
 
     /// All memory, as numbers for storing.

@@ -11,8 +11,8 @@ mod state;
 
 pub use auto::StepChoice;
 pub use config::{
-    Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
-    StepConfig,
+    Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig,
+    Source, StepConfig,
 };
 pub use resolve::{check, experiment};
 pub(crate) use run::hermite;

@@ -115,9 +115,8 @@ fn effects(config: &Config) -> Result<Vec<Applied>, Fault> {
         let effect = effects::find(&table.id).ok_or_else(|| EffectError::Unknown(table.id.clone()))?;
         effect.with(table.parameters.iter().map(|(name, value)| (name.as_str(), *value)))
     };
-    let place = |(index, table)| {
-        read(table).map_err(|error: EffectError| Fault::new("effect", format!("table {}: {error}", index + 1)))
-    };
+    let place =
+        |(index, table)| read(table).map_err(|error: EffectError| Fault::new("effect", format!("table {}: {error}", index + 1)));
     let mut effects: Vec<_> = config.effect.iter().enumerate().map(place).collect::<Result<_, _>>()?;
     effects.retain(|applied| !applied.is_off());
     Ok(effects)

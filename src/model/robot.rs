@@ -131,7 +131,9 @@ impl Robot {
         let laminate = Laminate::new(&self.material);
         let scales = &self.extensions;
         PiezoJoint {
-            stiffness: self.material.width * (laminate.flexural_rigidity / 2.0 / self.half_link_length()) * scales.stiffness_scale,
+            stiffness: self.material.width
+                * (laminate.flexural_rigidity / 2.0 / self.half_link_length())
+                * scales.stiffness_scale,
             rest_angle_per_volt: -laminate.rotation_per_volt * scales.gain_scale,
             damping_time: self.damping.time() * scales.damping_scale,
         }
@@ -142,7 +144,8 @@ impl Robot {
     pub fn segments(&self) -> Vec<Segment> {
         let Extensions { mass_scale, friction_scale, .. } = self.extensions;
         if let Some(bodies) = &self.bodies {
-            let scaled = |body: &Segment| Segment { mass: body.mass * mass_scale, friction: body.friction * friction_scale, ..*body };
+            let scaled =
+                |body: &Segment| Segment { mass: body.mass * mass_scale, friction: body.friction * friction_scale, ..*body };
             return bodies.iter().map(scaled).collect();
         }
         let m = self.motors_per_actuator as f64;

@@ -13,7 +13,14 @@ pub const CREEP: Effect = Effect {
     cause: "Domains keep switching slowly after a change of voltage.",
     equation: "θ_V = −γ·ℓ·(V + c·Σ q_j),  q̇_j = (V − q_j)/T_j,  T_j = 10^j s from 0.1 s on",
     source: "Physik Instrumente, piezo tutorial; creep of soft PZT and LIPCA benders: Beck et al.; lag derived.",
-    parameters: &[Parameter { name: "per_decade", unit: "1/decade", bounds: [-0.2, 0.3], off: Some(0.0), default: None, about: "growth c of the step response per decade of time" }],
+    parameters: &[Parameter {
+        name: "per_decade",
+        unit: "1/decade",
+        bounds: [-0.2, 0.3],
+        off: Some(0.0),
+        default: None,
+        about: "growth c of the step response per decade of time",
+    }],
     action: Action::Voltages(|p, n, duration| Box::new(Creep { per_decade: p[0], behind: vec![vec![0.0; n]; rungs(duration)] })),
 };
 

@@ -15,7 +15,14 @@ pub const FIELD_DEPENDENT_GAIN: Effect = Effect {
     source: "Data sheet of the MFC actuator: 400 pm/V below, 460 pm/V above 1 kV/mm; polynomial from general knowledge.",
     parameters: &[
         Parameter { name: "slope_per_kv", unit: "1/kV", bounds: [-0.5, 1.0], off: Some(0.0), default: Some(0.0), about: "b₁" },
-        Parameter { name: "curvature_per_kv2", unit: "1/kV²", bounds: [-0.5, 0.5], off: Some(0.0), default: Some(0.0), about: "b₂" },
+        Parameter {
+            name: "curvature_per_kv2",
+            unit: "1/kV²",
+            bounds: [-0.5, 0.5],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "b₂",
+        },
     ],
     action: Action::Voltages(|p, _, _| Box::new(Gain { slope: 1e-3 * p[0], curvature: 1e-6 * p[1] })),
 };

@@ -36,14 +36,7 @@ pub const HYSTERESIS: Effect = Effect {
             default: Some(0.5),
             about: "A: loss of gain at a turning point (Bouc-Wen)",
         },
-        Parameter {
-            name: "asymmetry",
-            unit: "",
-            bounds: [-0.9, 1.0],
-            off: None,
-            default: Some(0.0),
-            about: "c/b (Bouc-Wen)",
-        },
+        Parameter { name: "asymmetry", unit: "", bounds: [-0.9, 1.0], off: None, default: Some(0.0), about: "c/b (Bouc-Wen)" },
         Parameter { name: "exponent", unit: "", bounds: [1.0, 2.0], off: None, default: Some(1.0), about: "n (Bouc-Wen)" },
         Parameter {
             name: "plays",
@@ -61,7 +54,14 @@ pub const HYSTERESIS: Effect = Effect {
             default: Some(0.0),
             about: "power of the radius that the weights of the plays go with (Prandtl-Ishlinskii)",
         },
-        Parameter { name: "gain", unit: "", bounds: [0.5, 2.0], off: None, default: Some(1.0), about: "g: slope that goes with the loop" },
+        Parameter {
+            name: "gain",
+            unit: "",
+            bounds: [0.5, 2.0],
+            off: None,
+            default: Some(1.0),
+            about: "g: slope that goes with the loop",
+        },
         Parameter {
             name: "from_zero",
             unit: "",
@@ -104,7 +104,16 @@ impl BoucWen {
     fn new(p: &[f64], actuators: usize) -> Self {
         let b = p[1] / (1.0 + p[2]);
         let limit = 0.5 * STROKE * p[0] / p[6];
-        Self { slope: p[1], b, c: p[2] * b, exponent: p[3], limit, gain: p[6], volts: vec![0.0; actuators], state: vec![0.0; actuators] }
+        Self {
+            slope: p[1],
+            b,
+            c: p[2] * b,
+            exponent: p[3],
+            limit,
+            gain: p[6],
+            volts: vec![0.0; actuators],
+            state: vec![0.0; actuators],
+        }
     }
 
     /// dh/dV at the share `h` for a voltage that changes in the direction `sign`.

@@ -13,7 +13,14 @@ pub const PASSIVE_MARGIN: Effect = Effect {
     cause: "The ends of each patch carry no electrodes and do not bend by voltage.",
     equation: "γ(s) = γ for p·L/2 < s < L − p·L/2, else 0; joint i gets its share of active length",
     source: "Geometry of the M-8514 patch, by inference; derived.",
-    parameters: &[Parameter { name: "fraction", unit: "", bounds: [0.0, 0.6], off: Some(0.0), default: None, about: "share p of an actuator’s length that is passive, half of it at each end" }],
+    parameters: &[Parameter {
+        name: "fraction",
+        unit: "",
+        bounds: [0.0, 0.6],
+        off: Some(0.0),
+        default: None,
+        about: "share p of an actuator’s length that is passive, half of it at each end",
+    }],
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);
         robot.extensions.joint_gains.resize(joints, 1.0);

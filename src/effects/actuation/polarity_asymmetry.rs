@@ -13,7 +13,14 @@ pub const POLARITY_ASYMMETRY: Effect = Effect {
     cause: "The strain per volt differs along and against the direction of poling.",
     equation: "θ_V = −γ·ℓ·r·V for V > 0, −γ·ℓ·V otherwise",
     source: "The reference's constant 1.733; asymmetry: nonlinear equivalent piezoelectric coefficient of MFCs, 2016.",
-    parameters: &[Parameter { name: "ratio", unit: "", bounds: [0.2, 4.0], off: Some(1.0), default: None, about: "gain r of positive voltages, on top of positive_gain" }],
+    parameters: &[Parameter {
+        name: "ratio",
+        unit: "",
+        bounds: [0.2, 4.0],
+        off: Some(1.0),
+        default: None,
+        about: "gain r of positive voltages, on top of positive_gain",
+    }],
     action: Action::Voltages(|p, _, _| Box::new(Ratio(p[0]))),
 };
 

@@ -15,7 +15,14 @@ pub const WEAK_ACTUATOR: Effect = Effect {
     source: "From general knowledge.",
     parameters: &[
         Parameter { name: "actuator", unit: "", bounds: [1.0, 1e4], off: None, default: None, about: "the actuator, from 1" },
-        Parameter { name: "gain", unit: "", bounds: [0.0, 1.5], off: Some(1.0), default: None, about: "what is left of its gain" },
+        Parameter {
+            name: "gain",
+            unit: "",
+            bounds: [0.0, 1.5],
+            off: Some(1.0),
+            default: None,
+            about: "what is left of its gain",
+        },
     ],
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);

@@ -13,7 +13,14 @@ pub const DRIVER_LAG: Effect = Effect {
     cause: "The source's resistance charges the actuator's capacitance.",
     equation: "T·dV_a/dt + V_a = V_c,  T = R·C",
     source: "Capacitance per area: data sheet of the MFC actuator; derived.",
-    parameters: &[Parameter { name: "time_constant_s", unit: "s", bounds: [0.0, 0.2], off: Some(0.0), default: None, about: "time constant T" }],
+    parameters: &[Parameter {
+        name: "time_constant_s",
+        unit: "s",
+        bounds: [0.0, 0.2],
+        off: Some(0.0),
+        default: None,
+        about: "time constant T",
+    }],
     action: Action::Voltages(|p, n, _| Box::new(Lag { time: p[0], volts: vec![0.0; n] })),
 };
 

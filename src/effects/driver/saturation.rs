@@ -14,8 +14,22 @@ pub const SATURATION: Effect = Effect {
     equation: "V_a = min(V_hi, max(V_lo, V_c))",
     source: "Limits of the MFC actuator: data sheet, Smart Material Corp.",
     parameters: &[
-        Parameter { name: "max_v", unit: "V", bounds: [0.0, 5000.0], off: Some(f64::INFINITY), default: Some(f64::INFINITY), about: "largest voltage V_hi" },
-        Parameter { name: "min_v", unit: "V", bounds: [-5000.0, 0.0], off: Some(f64::NEG_INFINITY), default: Some(f64::NEG_INFINITY), about: "least voltage V_lo" },
+        Parameter {
+            name: "max_v",
+            unit: "V",
+            bounds: [0.0, 5000.0],
+            off: Some(f64::INFINITY),
+            default: Some(f64::INFINITY),
+            about: "largest voltage V_hi",
+        },
+        Parameter {
+            name: "min_v",
+            unit: "V",
+            bounds: [-5000.0, 0.0],
+            off: Some(f64::NEG_INFINITY),
+            default: Some(f64::NEG_INFINITY),
+            about: "least voltage V_lo",
+        },
     ],
     action: Action::Voltages(|p, _, _| Box::new(Limits { max: p[0], min: p[1] })),
 };

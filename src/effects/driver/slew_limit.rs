@@ -13,7 +13,14 @@ pub const SLEW_LIMIT: Effect = Effect {
     cause: "The amplifier's current limit bounds the rate of voltage.",
     equation: "|dV_a/dt| ≤ S, otherwise V_a = V_c",
     source: "Derived: S = I_max/C.",
-    parameters: &[Parameter { name: "rate_v_per_s", unit: "V/s", bounds: [100.0, 1e9], off: Some(f64::INFINITY), default: None, about: "largest rate S" }],
+    parameters: &[Parameter {
+        name: "rate_v_per_s",
+        unit: "V/s",
+        bounds: [100.0, 1e9],
+        off: Some(f64::INFINITY),
+        default: None,
+        about: "largest rate S",
+    }],
     action: Action::Voltages(|p, n, _| Box::new(Slew { rate: p[0], volts: vec![0.0; n] })),
 };
 
@@ -35,6 +42,11 @@ impl Voltages for Slew {
             *now += (*volts - *now).clamp(-most, most);
             *volts = *now;
         }
+    }
+
+    /// A jump begins a ramp at its moment, not at the step's.
+    fn parts(&self) -> usize {
+        16
     }
 
     fn memory(&self) -> Vec<f64> {

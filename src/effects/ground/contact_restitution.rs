@@ -13,6 +13,13 @@ pub const CONTACT_RESTITUTION: Effect = Effect {
     cause: "The contact returns part of the energy of an impact.",
     equation: "v⁺ = −e·v⁻, from 0.2 cm/s on",
     source: "Newton's law of impact; the threshold is Bullet's.",
-    parameters: &[Parameter { name: "restitution", unit: "", bounds: [0.0, 0.9], off: Some(0.0), default: None, about: "share e of the approach speed that is returned" }],
+    parameters: &[Parameter {
+        name: "restitution",
+        unit: "",
+        bounds: [0.0, 0.9],
+        off: Some(0.0),
+        default: None,
+        about: "share e of the approach speed that is returned",
+    }],
     action: Action::Robot(|p, robot| robot.extensions.restitution = p[0]),
 };

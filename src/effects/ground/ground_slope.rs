@@ -13,6 +13,13 @@ pub const GROUND_SLOPE: Effect = Effect {
     cause: "The ground is not level.",
     equation: "gravity (−g·sin α, −g·cos α) in the ground's axes",
     source: "Derived.",
-    parameters: &[Parameter { name: "angle_deg", unit: "°", bounds: [-45.0, 45.0], off: Some(0.0), default: None, about: "slope α, positive uphill along +x" }],
+    parameters: &[Parameter {
+        name: "angle_deg",
+        unit: "°",
+        bounds: [-45.0, 45.0],
+        off: Some(0.0),
+        default: None,
+        about: "slope α, positive uphill along +x",
+    }],
     action: Action::Robot(|p, robot| robot.extensions.slope += p[0].to_radians()),
 };

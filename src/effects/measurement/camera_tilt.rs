@@ -13,6 +13,13 @@ pub const CAMERA_TILT: Effect = Effect {
     cause: "The camera is rolled about its axis.",
     equation: "x_m = x·cos ψ − z·sin ψ,  z_m = x·sin ψ + z·cos ψ",
     source: "Derived.",
-    parameters: &[Parameter { name: "angle_deg", unit: "°", bounds: [-30.0, 30.0], off: Some(0.0), default: None, about: "roll ψ" }],
+    parameters: &[Parameter {
+        name: "angle_deg",
+        unit: "°",
+        bounds: [-30.0, 30.0],
+        off: Some(0.0),
+        default: None,
+        about: "roll ψ",
+    }],
     action: Action::View(|p, view| view.tilt += p[0].to_radians()),
 };

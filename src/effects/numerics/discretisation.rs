@@ -14,8 +14,22 @@ pub const DISCRETISATION: Effect = Effect {
     equation: "y(m, h) = y_∞ + a/m² + b·h^p",
     source: "Derived: the chain against the Euler-Bernoulli beam.",
     parameters: &[
-        Parameter { name: "motors_per_actuator", unit: "", bounds: [1.0, 100.0], off: None, default: None, about: "joints per actuator in place of the file’s" },
-        Parameter { name: "time_step_scale", unit: "", bounds: [0.001, 1000.0], off: Some(1.0), default: Some(1.0), about: "factor on the time step" },
+        Parameter {
+            name: "motors_per_actuator",
+            unit: "",
+            bounds: [1.0, 100.0],
+            off: None,
+            default: None,
+            about: "joints per actuator in place of the file’s",
+        },
+        Parameter {
+            name: "time_step_scale",
+            unit: "",
+            bounds: [0.001, 1000.0],
+            off: Some(1.0),
+            default: Some(1.0),
+            about: "factor on the time step",
+        },
     ],
     action: Action::Discretisation,
 };

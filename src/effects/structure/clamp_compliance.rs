@@ -13,6 +13,13 @@ pub const CLAMP_COMPLIANCE: Effect = Effect {
     cause: "The clamp gives, so the root turns in proportion to the moment on it.",
     equation: "φ = c·M_root",
     source: "J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived.",
-    parameters: &[Parameter { name: "compliance_rad_per_n_m", unit: "rad/(N·m)", bounds: [0.0, 10.0], off: Some(0.0), default: None, about: "turn c of the root per moment" }],
+    parameters: &[Parameter {
+        name: "compliance_rad_per_n_m",
+        unit: "rad/(N·m)",
+        bounds: [0.0, 10.0],
+        off: Some(0.0),
+        default: None,
+        about: "turn c of the root per moment",
+    }],
     action: Action::Robot(|p, robot| robot.extensions.clamp_compliance += 1e-7 * p[0]),
 };

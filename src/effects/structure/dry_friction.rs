@@ -13,6 +13,13 @@ pub const DRY_FRICTION: Effect = Effect {
     cause: "Rubbing in the laminate, wires or clamp opposes motion with a constant moment.",
     equation: "τ = −k·(θ − θ_V + η·θ̇) − τ_c·tanh(θ̇/ω_ε)",
     source: "Symptoms: Worden and Tomlinson, Nonlinearity in Structural Dynamics, 2001; Kerschen et al. 2006.",
-    parameters: &[Parameter { name: "moment_mn_m", unit: "mN·m", bounds: [0.0, 3.0], off: Some(0.0), default: None, about: "the moment τ_c in every joint" }],
+    parameters: &[Parameter {
+        name: "moment_mn_m",
+        unit: "mN·m",
+        bounds: [0.0, 3.0],
+        off: Some(0.0),
+        default: None,
+        about: "the moment τ_c in every joint",
+    }],
     action: Action::Robot(|p, robot| robot.extensions.dry_friction += 1e4 * p[0]),
 };

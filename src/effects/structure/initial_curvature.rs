@@ -14,8 +14,22 @@ pub const INITIAL_CURVATURE: Effect = Effect {
     equation: "τ = −k·(θ − θ_V − κ₀·ℓ + η·θ̇)",
     source: "Cure temperature: Smart Material FAQ; equation derived.",
     parameters: &[
-        Parameter { name: "curvature_per_m", unit: "1/m", bounds: [-5.0, 5.0], off: Some(0.0), default: None, about: "curvature κ₀; positive bends the right end down" },
-        Parameter { name: "actuator", unit: "", bounds: [0.0, 1e4], off: None, default: Some(0.0), about: "the actuator, from 1; 0: all of them" },
+        Parameter {
+            name: "curvature_per_m",
+            unit: "1/m",
+            bounds: [-5.0, 5.0],
+            off: Some(0.0),
+            default: None,
+            about: "curvature κ₀; positive bends the right end down",
+        },
+        Parameter {
+            name: "actuator",
+            unit: "",
+            bounds: [0.0, 1e4],
+            off: None,
+            default: Some(0.0),
+            about: "the actuator, from 1; 0: all of them",
+        },
     ],
     action: Action::Robot(|p, robot| {
         let curvature = &mut robot.extensions.rest_curvature;

@@ -13,6 +13,13 @@ pub const STRUCTURAL_DAMPING: Effect = Effect {
     cause: "The loss per cycle in the material is nearly independent of frequency, unlike viscous loss.",
     equation: "τ = −k·(θ − θ_V + η·θ̇ + ξ·Σ q_j),  q̇_j = θ̇ − q_j/T_j,  T_j = 10^j s,  loss factor 0.68·ξ",
     source: "Derived: a ladder of relaxations with log-uniform times.",
-    parameters: &[Parameter { name: "loss_factor", unit: "", bounds: [0.0, 0.2], off: Some(0.0), default: None, about: "loss factor η_h; the damping ratio is half of it" }],
+    parameters: &[Parameter {
+        name: "loss_factor",
+        unit: "",
+        bounds: [0.0, 0.2],
+        off: Some(0.0),
+        default: None,
+        about: "loss factor η_h; the damping ratio is half of it",
+    }],
     action: Action::Robot(|p, robot| robot.extensions.loss += p[0] / 0.68),
 };

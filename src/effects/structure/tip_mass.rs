@@ -16,7 +16,14 @@ pub const TIP_MASS: Effect = Effect {
     source: "Derived (Rayleigh quotient).",
     parameters: &[
         Parameter { name: "mass_g", unit: "g", bounds: [0.0, 2.0], off: Some(0.0), default: None, about: "the mass" },
-        Parameter { name: "position_mm", unit: "mm", bounds: [0.0, 1e5], off: None, default: Some(f64::INFINITY), about: "distance from the left end along the sheet; by default the right end" },
+        Parameter {
+            name: "position_mm",
+            unit: "mm",
+            bounds: [0.0, 1e5],
+            off: None,
+            default: Some(f64::INFINITY),
+            about: "distance from the left end along the sheet; by default the right end",
+        },
     ],
     action: Action::Robot(|p, robot| {
         let end = robot.material.actuator_length * robot.actuators as f64;
