@@ -4,6 +4,7 @@
 #   bash scripts/test.sh          the tests of `cargo test`, the live PyBullet check among them
 #   bash scripts/test.sh --long   besides: the shim under sanitizers, a run under valgrind, the whole reproduction of
 #                                 the paper (some minutes), the refusal of a machine without Bullet
+#   bash scripts/test.sh --hidden besides the first: every effect hidden in data and looked for (a quarter of an hour)
 #
 # CI sets CI=true, which means --long.
 set -euo pipefail
@@ -11,6 +12,8 @@ cd "$(dirname "$0")/.."
 
 long=false
 if [ "${1:-}" = --long ] || [ "${CI:-}" = true ]; then long=true; fi
+export SFERS_LONG=0
+if [ "${1:-}" = --hidden ]; then SFERS_LONG=1; fi
 packages=(build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv chromium)
 if $long; then packages+=(valgrind); fi
 bash scripts/debian.sh "${packages[@]}"

@@ -140,6 +140,25 @@ fn one_run_is_too_little_to_decide_and_the_diagnosis_says_so() {
 }
 
 #[test]
+fn the_published_numbers_are_tied_between_causes() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = sfers(folder.path(), &["diagnose", "preset:published-cantilever", "--out", "d", "--quiet", "--json"]);
+    let d: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(d["verdict"].as_str(), Some("tied"));
+    let named: Vec<String> = d["effects"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|effect| std::iter::once(&effect["id"]).chain(effect["tied_with"].as_array().unwrap()))
+        .map(|id| id.as_str().unwrap().to_owned())
+        .collect();
+    // A stiffer or a lighter sheet would do; a stronger actuator alone cannot raise a resonance.
+    assert!(["stiffness", "areal-mass"].iter().all(|id| named.iter().any(|name| name == id)), "{named:?}");
+    assert!(!named.iter().any(|name| name == "actuation-gain"), "{named:?}");
+    assert!(d["next_experiment"].is_string());
+}
+
+#[test]
 fn effects_are_listed_with_their_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let text = String::from_utf8(sfers(folder.path(), &["effects"]).stdout).unwrap();

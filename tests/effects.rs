@@ -276,6 +276,37 @@ fn what_cannot_be_applied_is_refused_by_name() {
 }
 
 #[test]
+fn both_engines_bend_alike_where_both_know_the_effect() {
+    let flat = ["simulation.start=flat", "simulation.duration_s=0.1"];
+    for (id, values) in [
+        ("hysteresis", vec![("width", 0.2)]),
+        ("creep", vec![("per_decade", 0.05)]),
+        ("driver-lag", vec![("time_constant_s", 0.01)]),
+        ("initial-curvature", vec![("curvature_per_m", 0.5)]),
+        ("stiffness-softening", vec![("softening_mm2", 2000.0)]),
+        ("structural-damping", vec![("loss_factor", 0.05)]),
+        ("passive-margin", vec![("fraction", 0.2)]),
+        ("stiffness", vec![("scale", 1.2)]),
+    ] {
+        let text = with(CANTILEVER, id, &values);
+        let on = |engine: &str, step: &str| {
+            let settings: Vec<&str> = flat.iter().copied().chain([engine, step]).collect();
+            tip(&run(&text, &settings))
+        };
+        let bullet = on("simulation.engine=bullet", "simulation.time_step_s=5e-6");
+        let planar = on("simulation.engine=planar", "simulation.time_step_s=1e-4");
+        println!("{id}: {:e}", bullet - planar);
+        assert!((bullet - planar).abs() < 1e-3, "{id}: {bullet} {planar}");
+    }
+    let heavy = Source::from_text(
+        "x.toml",
+        with(CANTILEVER, "tip-mass", &[("mass_g", 0.1)]).replace("planar", "bullet").replace("settled", "flat"),
+    );
+    let refused = experiment::experiment(&heavy).unwrap().engine().err().unwrap().to_string();
+    assert!(refused.contains("a mass fixed to the sheet"), "{refused}");
+}
+
+#[test]
 fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     let text = with(&with(CANTILEVER, "hysteresis", &[("width", 0.2)]), "creep", &[("per_decade", 0.02)]);
     let text = with(&with(&text, "driver-lag", &[("time_constant_s", 0.01)]), "structural-damping", &[("loss_factor", 0.02)]);

@@ -1,7 +1,7 @@
 //! An effect is hidden in data by a simulator that shares nothing with this program, and the diagnosis has to find it; where nothing is hidden it
 //! has to be silent; where the cause is in no library it has to say so.
 //!
-//! The short suite runs a sample of it. With `SFERS_LONG=1` (set by `scripts/test.sh --long`) each effect is hidden once in a size that turns with the
+//! The short suite runs a sample of it. With `SFERS_LONG=1` (set by `scripts/test.sh --hidden`) each effect is hidden once in a size that turns with the
 //! seed; `cargo run --release --example confusability` runs all sizes, noises and seeds and prints the matrix of docs/validation.md.
 
 #[path = "hidden/generator.rs"]

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::experiment::{
-    Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment,
+    Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment, presets,
 };
 use crate::model::Robot;
 
@@ -162,13 +162,17 @@ impl Dataset {
         self.markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}", marker.name))).collect()
     }
 
-    /// Reads a description and its runs.
+    /// Reads a description, a file or `preset:NAME`, and its runs.
     ///
     /// # Errors
     /// [`DataError`] with file, line and column.
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
+        let preset = path.to_str().and_then(|path| path.strip_prefix("preset:")).and_then(presets::find_dataset);
+        let text = match preset {
+            Some(preset) => preset.text.to_owned(),
+            None => std::fs::read_to_string(path)
+                .map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?,
+        };
         let description: Description = toml::from_str(&text).map_err(|error| ConfigError::Syntax {
             source_name: path.display().to_string(),
             message: error.to_string().trim_end().into(),

@@ -228,7 +228,7 @@ impl<'a> Bench<'a> {
         Ok(self.fit_held(&model, runs, Care::Full, Some((term, parameter)))?.chi2)
     }
 
-    /// How much larger than for independent noise the variance of each coordinate is, from the residuals as they are: with blocks b of [`BLOCK`]
+    /// How much larger than for independent noise the variance of each coordinate is, from the residuals as they are: with blocks b of fifty
     /// values, C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against C = (JᵀJ)⁻¹; at least 1, and at least χ² per value.
     ///
     /// # Errors

@@ -20,6 +20,8 @@ const LEAST_SHARE: f64 = 0.004;
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if Bayes's information criterion falls by so much.
 const LEAST_BIC: f64 = 10.0;
+/// A cause that no held-out run shows is looked at again if it lowers the fit runs' χ² by this share of the number of values.
+const SEEN_BY_FIT: f64 = 0.1;
 /// Two models are tied if their χ² differ by less than this, or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
 /// Candidates that are fitted in full after screening.
@@ -313,13 +315,50 @@ impl Search<'_> {
         for _ in 0..MOST_CAUSES {
             let trials = self.trials(&best)?;
             let top = trials.first().map(|trial| trial.scored.clone());
+            let last = &trials;
+            let worthy = match top.filter(|top| self.is_worth(top, &best)) {
+                Some(top) => Some(top),
+                None => self.seen_by_fit_runs(&mut best, last)?,
+            };
+            let Some(worthy) = worthy else {
+                first.get_or_insert(trials);
+                break;
+            };
+            best = self.settle(worthy)?;
             if first.is_none() {
                 first = Some(trials);
             }
-            let Some(top) = top.filter(|top| self.is_worth(top, &best)) else { break };
-            best = self.settle(top)?;
         }
         Ok((best, first.unwrap_or_default()))
+    }
+
+    /// Whether the fit runs miss what `less` leaves out.
+    fn is_seen_by_fit(&self, more: &Scored, less: &Scored) -> bool {
+        less.fitted - more.fitted > SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.bench.count(&self.split.fit) as f64
+    }
+
+    /// A cause may show in runs that are fitted and in none that is held out. If one does much for the fit, the run it does most for is held out as
+    /// well: the cause, fitted to the others, has to do for it too. Keeps the new split if it does.
+    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Result<Option<Scored>, String> {
+        let Some(trial) = trials.iter().min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted)) else { return Ok(None) };
+        let gain = |run: &usize| square(&base.residuals[*run]) - square(&trial.scored.residuals[*run]);
+        let most = self.split.fit.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b)));
+        let Some(run) = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base)) else {
+            return Ok(None);
+        };
+        (self.progress)(&format!("{} on another split", self.id(trial.candidate)));
+        let before = self.split.clone();
+        self.split.fit.retain(|other| *other != run);
+        self.split.held.push(run);
+        self.split.held.sort_unstable();
+        let plain = self.fitted(base.model())?;
+        let with = self.fitted(trial.scored.model())?;
+        if self.is_worth(&with, &plain) {
+            *base = plain;
+            return Ok(Some(with));
+        }
+        self.split = before;
+        Ok(None)
     }
 
     /// Takes out what is not worth it, the least needed first.
@@ -342,7 +381,7 @@ impl Search<'_> {
             }
             let least = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total()));
             match least {
-                Some(least) if !self.is_worth(&best, &least) => best = least,
+                Some(least) if !self.is_worth(&best, &least) && !self.is_seen_by_fit(&best, &least) => best = least,
                 _ => return Ok(best),
             }
         }

@@ -4,7 +4,7 @@ use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
 use crate::bullet::{self, BaseState, BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World};
-use crate::model::{Extensions, LOSS_TIMES, Mount, Robot};
+use crate::model::{Extensions, LOSS_TIMES, Mount, Robot, StickSlip};
 
 /// Collision margin of every box (cm), as PyBullet sets it for bodies built by its calls.
 const COLLISION_MARGIN: f64 = 0.001;
@@ -50,6 +50,17 @@ impl BulletEngine {
     pub fn with_settings(robot: &Robot, time_step: f64, settings: &SolverSettings) -> Result<Self, EngineError> {
         robot.check()?;
         let extensions = &robot.extensions;
+        for (what, asked) in [
+            ("a clamp that gives", extensions.clamp_compliance != 0.0),
+            ("a mass fixed to the sheet", !extensions.point_masses.is_empty()),
+            ("drag in air", extensions.drag != 0.0),
+            ("restitution", extensions.restitution != 0.0),
+            ("friction that depends on speed", extensions.stick_slip != StickSlip::OFF),
+        ] {
+            if asked {
+                return Err(EngineError::Unsupported { engine: "bullet", what });
+            }
+        }
         let mut world = World::new(settings)?;
         if extensions.slope != 0.0 {
             let (sin, cos) = extensions.slope.sin_cos();

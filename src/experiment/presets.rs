@@ -51,6 +51,11 @@ presets! {
 }
 
 presets! {
+    DATASETS "datasets/"
+    "published-cantilever"
+}
+
+presets! {
     SWEEPS "sweeps/"
     "cantilever-frequency-scan"
     "cantilever-voltage-scan"
@@ -134,6 +139,11 @@ classes! {
 /// Finds a preset by its name.
 pub fn find(name: &str) -> Option<&'static Preset> {
     PRESETS.iter().find(|preset| preset.name == name)
+}
+
+/// The built-in data set of that name: measured numbers for `sfers diagnose`.
+pub fn find_dataset(name: &str) -> Option<&'static Preset> {
+    DATASETS.iter().find(|preset| preset.name == name)
 }
 
 /// Finds a sweep by its name, or by the reference's class whose scan it is.
