@@ -4,7 +4,7 @@
 //!
 //! [`model`] turns a laminate's layers into a beam and the beam into a chain of links and hinges; [`drive`] gives every actuator a voltage
 //! in time; [`actuator`] turns angle, rate and voltage of a joint into its torque; an [`engine`] steps the chain; an
-//! [`experiment`] runs the loop and fills a [`recording`], from which measures are taken. [`sweep`] does so over a grid of values; [`view`] draws; [`export`] writes the robots for other simulators; [`reproduce`] puts
+//! [`experiment`] runs the loop and fills a [`recording`], from which measures are taken. [`sweep`] does so over a grid of values; [`view`] draws; [`effects`] extend the model where they act, and [`diagnose`] finds which of them measured data ask for; [`export`] writes the robots for other simulators; [`reproduce`] puts
 //! the paper's results beside ours. [`crosscheck`] compares a recording with the
 //! published simulator's, number by number. [`bullet`] is the safe layer over the physics library, [`analytic`] holds closed forms.
 //!

@@ -79,7 +79,8 @@ fn nothing_is_found_where_nothing_is_hidden() {
         assert_eq!((d.verdict, physics(d)), (Verdict::None, vec![]), "seed {seed}");
         // Twelve joints stand behind the data, three in the nominal model.
         assert_eq!(d.effects[0].id, "discretisation");
-        assert!(d.baseline.rmse_heldout_mm > 10.0 * d.extended.rmse_heldout_mm);
+        // The nominal model is 1.9 mm off near resonance.
+        assert!(d.baseline.rmse_mm > 10.0 * d.extended.rmse_mm);
     }
 }
 

@@ -123,7 +123,6 @@ fn remove_outliers(times: &[f64], y: &[f64], good: &mut [bool], noise: f64) -> u
     let mut work: Vec<f64> = y.to_vec();
     let limit = OUTLIER * DIFFERENCE_NOISE * noise;
     let mut count = 0;
-    // Sharp but true features change several neighbours alike; an outlier stands alone: its own difference is 1.5 times its neighbours' (4/6).
     for _ in 0..y.len() / 5 {
         let d = differences(times, &work);
         let size = |i: usize| d.get(i).copied().flatten().unwrap_or(0.0);

@@ -197,8 +197,8 @@ impl Search<'_> {
         Ok(scored)
     }
 
-    /// How much every start of every candidate would lower χ² on all runs if the model were linear, beside what the model's own coordinates and
-    /// `beside` could do; best first, with the model to fit from.
+    /// How much every start of every candidate would lower χ² on all runs if the model were linear, beside what the model's own coordinates
+    /// could do; best first, with the model to fit from.
     pub fn screen(&self, from: &Scored) -> Result<Vec<(f64, Model)>, String> {
         let runs = self.split.all();
         let base = from.model();
