@@ -76,7 +76,6 @@ impl Oscillator {
             kind: if is_constant { "calibration" } else { "structure" },
             cause,
             is_constant,
-            is_measurement: false,
             parameters: vec![Free { name, unit: "", off: Some(off), bounds, scale, inverse: false }],
             fixed: Vec::new(),
             starts: vec![vec![start]],

@@ -295,7 +295,7 @@ fn both_engines_bend_alike_where_both_know_the_effect() {
         };
         let bullet = on("simulation.engine=bullet", "simulation.time_step_s=5e-6");
         let planar = on("simulation.engine=planar", "simulation.time_step_s=1e-4");
-        println!("{id}: {:e}", bullet - planar);
+        // Bullet is of first order, and its voltages are up to two steps late. Seen: 0.009 mm for the jump into a curvature, 0.006 mm else.
         assert!((bullet - planar).abs() < 1e-3, "{id}: {bullet} {planar}");
     }
     let heavy = Source::from_text(

@@ -53,7 +53,7 @@ fn is_right(d: &Diagnosis, hidden: &str) -> bool {
 
 #[test]
 fn hidden_effects_are_named() {
-    // One of each folder; all of them where there is time. Seen: every case of the long suite.
+    // Some of every kind; all of them where there is time.
     let some = ["tip-mass", "hysteresis", "time-delay", "sensor-scale", "actuation-gain"];
     let chosen: Vec<&str> = if long() { INSIDE.to_vec() } else { some.to_vec() };
     let mut wrong = Vec::new();
@@ -64,7 +64,7 @@ fn hidden_effects_are_named() {
         if truth.trace_mm >= 0.15 && !is_right(d, id) {
             wrong.push(format!("{id}, {:.2} mm: {:?} {:?}", truth.trace_mm, d.verdict, physics(d)));
         } else if is_right(d, id) {
-            assert!(d.extended.rmse_heldout_mm < 1.3 * 0.05, "{id}: held-out error {} mm", d.extended.rmse_heldout_mm);
+            assert!(d.extended.rmse_heldout_mm < 1.2 * 0.05, "{id}: held-out error {} mm", d.extended.rmse_heldout_mm);
         }
     }
     assert!(20 * wrong.len() <= chosen.len(), "{wrong:?}");

@@ -49,7 +49,7 @@ pub struct Fit {
     pub information: DMatrix<f64>,
 }
 
-/// The loop's view of a plant: which runs count, and how often it was simulated.
+/// The loop's view of a plant: which values count, and what is taken for each run's unknowns.
 pub struct Bench<'a> {
     /// The plant.
     pub plant: &'a dyn Plant,
@@ -98,7 +98,7 @@ impl<'a> Bench<'a> {
     }
 
     /// The coordinate's step for a finite difference: away from the nearer bound.
-    fn step(&self, model: &Model, (term, parameter): (usize, usize)) -> f64 {
+    pub(super) fn step(&self, model: &Model, (term, parameter): (usize, usize)) -> f64 {
         let free = &self.plant.candidates()[model.terms[term].candidate].parameters[parameter];
         let x = model.terms[term].x[parameter];
         let step = DIFFERENCE * free.scale;

@@ -35,8 +35,6 @@ pub struct Candidate {
     pub cause: &'static str,
     /// A constant of the nominal model: fitted before physics is blamed.
     pub is_constant: bool,
-    /// Between plant and record: tried before physics is blamed.
-    pub is_measurement: bool,
     /// What is fitted.
     pub parameters: Vec<Free>,
     /// Parameters that are given.

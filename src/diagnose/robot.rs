@@ -231,8 +231,9 @@ pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
         let fits = match effect.id {
             "discretisation" => false,
             "clamp-compliance" => clamped,
-            // With m = 1 nothing but the gain would change; of a single actuator it is the gain.
+            // Of a single actuator it is the gain.
             "weak-actuator" => robot.actuators > 1,
+            // The tip alone cannot tell it from the gain.
             "passive-margin" => robot.actuators > 1 || markers > 1,
             _ => effect.kind != Kind::Ground || ground,
         };
@@ -309,7 +310,6 @@ pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
                 kind: effect.kind.name(),
                 cause: effect.cause,
                 is_constant: effect.kind == Kind::Calibration,
-                is_measurement: effect.kind == Kind::Measurement,
                 parameters: parameters.collect(),
                 fixed,
                 starts,

@@ -254,11 +254,9 @@ impl Search<'_> {
     fn tangents(&self, model: &Model, runs: &[usize], plain: &DVector<f64>) -> Result<Vec<DVector<f64>>, String> {
         let columns: Vec<DVector<f64>> = places(model)
             .par_iter()
-            .map(|(term, parameter)| {
+            .map(|place| {
                 let mut shifted = model.clone();
-                let p = &self.bench.plant.candidates()[model.terms[*term].candidate].parameters[*parameter];
-                let x = &mut shifted.terms[*term].x[*parameter];
-                *x += if *x + 0.02 * p.scale > p.bounds[1] { -0.02 * p.scale } else { 0.02 * p.scale };
+                shifted.terms[place.0].x[place.1] += self.bench.step(model, *place);
                 Ok(DVector::from_vec(self.bench.residuals_of(&shifted, runs)?.concat()) - plain)
             })
             .collect::<Result<_, String>>()?;

@@ -333,6 +333,7 @@ pub fn diagnose(
         dataset: name.to_owned(),
         verdict,
         summary: summary(verdict, &effects, unexplained_fraction, poor.as_deref(), best.model().resolution, refined),
+        // Where what is left is no more than noise, its share of a small misfit says nothing: it is given as a share of the noise then.
         unexplained_fraction: if is_unexplained { unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
         unexplained,
         noise_mm: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64,
