@@ -7,6 +7,9 @@
 //! Moments of jumps between rows belong to a run, not to the model ([`Plant::unknowns`]); they are fitted run by run between rounds of the
 //! model's own parameters. Every sum runs in a fixed order, so results do not depend on the number of threads.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -19,10 +22,13 @@ const ENOUGH: f64 = 1e-6;
 const ENOUGH_OF_ITSELF: f64 = 1e-4;
 const MOST_ROUNDS: usize = 25;
 /// Values in a block that structure of the residuals may extend over.
-const BLOCK: usize = 50;
+pub(super) const BLOCK: usize = 50;
 /// The same where models are only to be ranked.
 const ENOUGH_TO_RANK: f64 = 2e-2;
 const MOST_ROUNDS_TO_RANK: usize = 8;
+
+/// Values of predictions that are kept for the next time, twice: those used lately and those before them.
+const MOST_KEPT: usize = 2_000_000;
 
 /// How far a fit is carried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +63,40 @@ pub struct Bench<'a> {
     pub unknowns: Unknowns,
     /// Which values of each run count.
     pub used: Vec<Vec<bool>>,
+    kept: Mutex<Kept>,
+}
+
+/// Predictions by what they were made from. Fits begin where others ended, so one in five is asked for again.
+#[derive(Default)]
+struct Kept {
+    lately: HashMap<Vec<u64>, Arc<Vec<f64>>>,
+    before: HashMap<Vec<u64>, Arc<Vec<f64>>>,
+    values: usize,
+}
+
+impl Kept {
+    fn get(&self, key: &[u64]) -> Option<Arc<Vec<f64>>> {
+        self.lately.get(key).or_else(|| self.before.get(key)).cloned()
+    }
+
+    fn put(&mut self, key: Vec<u64>, predicted: &Arc<Vec<f64>>) {
+        if self.values > MOST_KEPT {
+            self.before = std::mem::take(&mut self.lately);
+            self.values = 0;
+        }
+        self.values += predicted.len();
+        self.lately.insert(key, predicted.clone());
+    }
+}
+
+/// Everything that a prediction depends on.
+fn key(model: &Model, run: usize, unknowns: &[f64]) -> Vec<u64> {
+    let terms = model.terms.iter().flat_map(|term| {
+        let numbers = term.x.iter().map(|x| x.to_bits());
+        [term.candidate as u64, term.x.len() as u64].into_iter().chain(numbers)
+    });
+    let whole = [run as u64, model.resolution.to_bits(), u64::from(model.fine)];
+    whole.into_iter().chain(terms).chain(unknowns.iter().map(|x| x.to_bits())).collect()
 }
 
 /// Residuals of one run in standard deviations.
@@ -67,7 +107,19 @@ impl<'a> Bench<'a> {
     pub fn new(plant: &'a dyn Plant) -> Self {
         let unknowns = (0..plant.signals().len()).map(|run| vec![1.0; plant.unknowns(run)]).collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
-        Self { plant, unknowns, used }
+        Self { plant, unknowns, used, kept: Mutex::default() }
+    }
+
+    fn predict(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Arc<Vec<f64>>, String> {
+        let key = key(model, run, unknowns);
+        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = kept().get(&key);
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let predicted = Arc::new(self.plant.predict(model, run, unknowns)?);
+        kept().put(key, &predicted);
+        Ok(predicted)
     }
 
     /// Residuals of a run.
@@ -77,8 +129,8 @@ impl<'a> Bench<'a> {
 
     fn residuals_with(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Residuals, String> {
         let signal = &self.plant.signals()[run];
-        let predicted = self.plant.predict(model, run, unknowns)?;
-        let each = signal.values.iter().zip(&predicted).zip(&signal.sigmas).zip(&self.used[run]);
+        let predicted = self.predict(model, run, unknowns)?;
+        let each = signal.values.iter().zip(&*predicted).zip(&signal.sigmas).zip(&self.used[run]);
         Ok(each.map(|(((y, f), sigma), used)| if *used { (y - f) / sigma } else { 0.0 }).collect())
     }
 

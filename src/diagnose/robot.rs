@@ -9,12 +9,14 @@ use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
 use crate::effects::{self, Applied, EFFECTS, Kind, Parameter, Path, View};
-use crate::engine::{Engine, EngineError, PlanarEngine};
+use crate::engine::{Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::experiment::hermite;
 use crate::model::{Mount, PointMass, Robot};
 
 /// Joints per actuator that are tried: what lies beyond changes a cantilever's frequency by less than 0.06 %.
 const JOINTS: [usize; 12] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20];
+/// On the floor contact leaves more open than joints beyond these do.
+const JOINTS_ON_THE_FLOOR: usize = 8;
 /// Time steps of a clamped robot follow its slowest mode and the rows; those of a robot on the ground follow impacts.
 const STEPS_PER_PERIOD: f64 = 220.0;
 const GROUND_STEP: f64 = 1e-4;
@@ -279,7 +281,17 @@ pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
                     vec![("plays", 1.0), ("from_zero", 1.0)],
                 ),
             ],
-            "creep" => vec![one("per_decade", 0.02, &[0.02])],
+            "creep" => {
+                let ladder = |rungs: f64| -> Form {
+                    (vec![("per_decade", 0.02), ("power", 0.2)], vec![vec![0.02, 0.0]], vec![("rungs_per_decade", rungs)])
+                };
+                let single: Form = (
+                    vec![("per_decade", 0.02), ("fastest_s", 0.3)],
+                    vec![vec![0.02, 0.3], vec![0.02, 3.0]],
+                    vec![("rungs_per_decade", 0.0)],
+                );
+                vec![ladder(1.0), ladder(2.0), single]
+            }
             "field-dependent-gain" => {
                 vec![(vec![("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)], vec![vec![0.05, 0.0]], Vec::new())]
             }
@@ -339,7 +351,8 @@ impl Plant for RobotPlant {
     /// Joints per actuator: the nominal number, then every finer one of a fixed ladder.
     fn resolutions(&self) -> Vec<f64> {
         let nominal = self.robot.motors_per_actuator;
-        let finer = JOINTS.into_iter().filter(|m| *m > nominal);
+        let most = if self.robot.mount == Mount::Ground { JOINTS_ON_THE_FLOOR } else { usize::MAX };
+        let finer = JOINTS.into_iter().filter(|m| *m > nominal && *m <= most);
         std::iter::once(nominal).chain(finer).map(|m| m as f64).collect()
     }
 
@@ -418,6 +431,7 @@ fn track_from(
         _ => PlanarEngine::new(robot, h),
     };
     let mut engine = build(robot)?;
+    engine.set_friction_model(FrictionModel::Coulomb);
     let n = robot.actuators;
     let mut start = vec![0.0; n];
     drive.voltages(0.0, &mut start);

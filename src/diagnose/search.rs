@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::dataset::Role;
-use super::fit::{Bench, Care, Fit, Residuals, places, square};
+use super::fit::{BLOCK, Bench, Care, Fit, Residuals, places, square};
 use super::plant::{Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of a sixth of the noise (rms): other
@@ -146,20 +146,23 @@ impl Search<'_> {
 
     /// How far the χ² of `worse` lies above that of `better` on `runs`, in standard errors and in itself.
     ///
-    /// With d the difference of the predictions in units of the noise, noise of unit variance makes Δχ² scatter by 2 |d|. What is left of
-    /// structure in the residuals of the better model makes that larger by the root of its mean square.
+    /// With a the residuals of the better model and d the difference of the predictions, both in units of the noise, Δχ² = Σ (2 a d + d²). Noise of
+    /// unit variance makes it scatter by 2 |d|, and structure that is left in a by 2 √Σ (Σ a d)² with inner sums over blocks of values that
+    /// may hang together; the larger of the two counts.
     pub fn gap(&self, better: &Scored, worse: &Scored, runs: &[usize]) -> (f64, f64) {
-        let (mut sum, mut apart, mut left, mut count) = (0.0, 0.0, 0.0, 0.0);
+        let (mut sum, mut apart, mut structure) = (0.0, 0.0, 0.0);
         for run in runs {
-            for (a, b) in better.residuals[*run].iter().zip(&worse.residuals[*run]) {
-                sum += b * b - a * a;
-                apart += (b - a) * (b - a);
-                left += a * a;
-                count += 1.0;
+            for (a, b) in better.residuals[*run].chunks(BLOCK).zip(worse.residuals[*run].chunks(BLOCK)) {
+                let mut along = 0.0;
+                for (a, b) in a.iter().zip(b) {
+                    sum += b * b - a * a;
+                    apart += (b - a) * (b - a);
+                    along += a * (b - a);
+                }
+                structure += along * along;
             }
         }
-        let noise = (left / f64::max(count, 1.0)).max(1.0).sqrt();
-        (sum / (2.0 * noise * apart.sqrt()).max(1e-9), sum)
+        (sum / (2.0 * f64::max(apart, structure).sqrt()).max(1e-9), sum)
     }
 
     /// Whether `more` is worth its additional parameters beside `less`.
@@ -185,6 +188,13 @@ impl Search<'_> {
         constants
             .map(|(candidate, c)| Term { candidate, x: c.parameters.iter().map(|p| p.off.unwrap_or(p.bounds[0])).collect() })
             .collect()
+    }
+
+    /// A model with all constants free; those that it has not are added at the end.
+    pub fn with_constants(&self, model: &Model) -> Model {
+        let mut all = model.clone();
+        all.terms.extend(self.constants().into_iter().filter(|c| model.terms.iter().all(|term| term.candidate != c.candidate)));
+        all
     }
 
     /// The nominal model with its constants free.
@@ -296,6 +306,14 @@ impl Search<'_> {
             if let Ok(scored) = self.ranked(&model) {
                 trials.push(Trial { candidate: term.candidate, scored });
             }
+        }
+        // Those that may win are fitted to the end: a fit that is cut short may look better on held-out runs than one that goes further.
+        let best = |by: &dyn Fn(&Scored) -> f64| (0..trials.len()).min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)));
+        let mut ahead = vec![best(&|scored| self.judged(scored)), best(&|scored| scored.total())];
+        ahead.dedup();
+        for index in ahead.into_iter().flatten() {
+            let model = trials[index].scored.model().clone();
+            trials[index].scored = self.fitted(&model)?;
         }
         trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
         Ok(trials)

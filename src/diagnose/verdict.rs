@@ -439,7 +439,8 @@ fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -> Result<In
     Ok(Intervals { ends, sizes, correlations, condition: condition(&scored.fit.information) })
 }
 
-/// How far each coordinate moves with the discretisation: to the next coarser number of joints, and with the time step.
+/// How far each coordinate moves with the discretisation, to the next coarser number of joints and with the time step, and with constants that are
+/// nominal because the discretisation could do what they did.
 fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, String> {
     let coordinates = |model: &Model| -> Vec<f64> { model.terms.iter().flat_map(|term| term.x.clone()).collect() };
     let own = coordinates(best.model());
@@ -451,6 +452,7 @@ fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, String> {
         (search.progress)("how far the discretisation matters");
         others.push(search.fitted(&Model { resolution: ladder[at - 1], ..best.model().clone() })?);
         others.push(search.fitted(&Model { fine: false, ..best.model().clone() })?);
+        others.push(search.fitted(&search.with_constants(best.model()))?);
     }
     for other in &others {
         for (moved, (a, b)) in moved.iter_mut().zip(own.iter().zip(coordinates(other.model()))) {

@@ -1,8 +1,11 @@
 //! Domains keep switching slowly after a change of voltage.
 //!
 //! ```text
-//! θ_V = −γ·ℓ·(V + c·Σ q_j),  q̇_j = (V − q_j)/T_j,  T_j = 10^j s from 0.1 s on
+//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r) up to three times the record's length,  w_j = c/r·(T_j/1 s)^p
 //! ```
+//!
+//! With p = 0 a step grows by c of itself in every decade of time, with another p by a power law of time. r is the number of rungs in a decade; the
+//! usual ladder has one, the first at 0.1 s. With r = 0 there is one rung of the weight c: a Kelvin-Voigt element.
 
 use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
 
@@ -11,31 +14,54 @@ pub const CREEP: Effect = Effect {
     id: "creep",
     kind: Kind::Actuation,
     cause: "Domains keep switching slowly after a change of voltage.",
-    equation: "θ_V = −γ·ℓ·(V + c·Σ q_j),  q̇_j = (V − q_j)/T_j,  T_j = 10^j s from 0.1 s on",
-    source: "Physik Instrumente, piezo tutorial; creep of soft PZT and LIPCA benders: Beck et al.; lag derived.",
-    parameters: &[Parameter {
-        name: "per_decade",
-        unit: "1/decade",
-        bounds: [-0.2, 0.3],
-        off: Some(0.0),
-        default: None,
-        about: "growth c of the step response per decade of time",
-    }],
-    action: Action::Voltages(|p, n, duration| Box::new(Creep { per_decade: p[0], behind: vec![vec![0.0; n]; rungs(duration)] })),
+    equation: "θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p",
+    source: "Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.",
+    parameters: &[
+        Parameter {
+            name: "per_decade",
+            unit: "1/decade",
+            bounds: [-0.2, 0.3],
+            off: Some(0.0),
+            default: None,
+            about: "growth c of the step response in the decade about 1 s",
+        },
+        Parameter { name: "power", unit: "", bounds: [-1.0, 1.0], off: None, default: Some(0.0), about: "exponent p" },
+        Parameter {
+            name: "rungs_per_decade",
+            unit: "",
+            bounds: [0.0, 4.0],
+            off: None,
+            default: Some(1.0),
+            about: "r; 0 is a single rung of the weight c",
+        },
+        Parameter {
+            name: "fastest_s",
+            unit: "s",
+            bounds: [0.01, 100.0],
+            off: None,
+            default: Some(0.1),
+            about: "time constant T_0 of the first rung",
+        },
+    ],
+    action: Action::Voltages(|p, n, duration| {
+        let rungs = ladder(p[0], p[1], p[2], p[3], duration);
+        Box::new(Creep { behind: vec![vec![0.0; n]; rungs.len()], rungs })
+    }),
 };
 
-/// Rungs of the ladder in a run of `duration` (s): as long as a time constant is below three times that.
-fn rungs(duration: f64) -> usize {
-    (0..).find(|rung| time(*rung) > 3.0 * duration).unwrap_or(0).max(1)
-}
-
-/// Time constants (s) of the ladder: 0.1 s and ten times as long from rung to rung.
-fn time(rung: usize) -> f64 {
-    0.1 * 10_f64.powi(rung as i32)
+/// Time constant (s) and weight of every rung in a run of `duration` (s).
+fn ladder(growth: f64, power: f64, per_decade: f64, fastest: f64, duration: f64) -> Vec<[f64; 2]> {
+    if per_decade == 0.0 {
+        return vec![[fastest, growth]];
+    }
+    let times = (0..).map(|rung| fastest * 10_f64.powf(f64::from(rung) / per_decade));
+    let rungs = times.enumerate().take_while(|(rung, time)| *rung == 0 || *time <= 3.0 * duration);
+    rungs.map(|(_, time)| [time, growth / per_decade * time.powf(power)]).collect()
 }
 
 struct Creep {
-    per_decade: f64,
+    /// T_j (s) and w_j.
+    rungs: Vec<[f64; 2]>,
     /// q_j of every actuator.
     behind: Vec<Vec<f64>>,
 }
@@ -44,20 +70,21 @@ impl Voltages for Creep {
     /// What has crept before is part of the settled shape: q_j = V.
     fn settle(&mut self, volts: &mut [f64]) {
         self.behind.iter_mut().for_each(|q| q.copy_from_slice(volts));
-        volts.iter_mut().for_each(|v| *v *= 1.0 + self.per_decade * self.behind.len() as f64);
+        let whole: f64 = self.rungs.iter().map(|[_, weight]| weight).sum();
+        volts.iter_mut().for_each(|v| *v *= 1.0 + whole);
     }
 
     fn pass(&mut self, dt: f64, volts: &mut [f64]) {
         for (i, volts) in volts.iter_mut().enumerate() {
             let mut crept = 0.0;
-            for (rung, q) in self.behind.iter_mut().enumerate() {
-                let steps = dt / time(rung);
+            for ([time, weight], q) in self.rungs.iter().zip(&mut self.behind) {
+                let steps = dt / time;
                 let gone = -(-steps).exp_m1();
                 let away = q[i] - *volts;
-                crept += *volts + away * gone / steps;
+                crept += weight * (*volts + away * gone / steps);
                 q[i] = *volts + away * (1.0 - gone);
             }
-            *volts += self.per_decade * crept;
+            *volts += crept;
         }
     }
 
@@ -77,7 +104,7 @@ mod tests {
     #[test]
     fn a_step_grows_by_the_same_amount_in_every_decade() {
         let Action::Voltages(make) = CREEP.action else { unreachable!() };
-        let mut creep = make(&[0.02], 1, 100.0);
+        let mut creep = make(&[0.02, 0.0, 1.0, 0.1], 1, 100.0);
         creep.settle(&mut [0.0]);
         let (dt, mut at) = (1e-3, Vec::new());
         for step in 1..=30_000 {
@@ -91,5 +118,32 @@ mod tests {
         for pair in at.windows(2) {
             assert!((pair[1] - pair[0] - 20.0).abs() < 1.0, "{at:?}");
         }
+    }
+    #[test]
+    fn finer_rungs_grow_alike_and_a_power_of_time_grows_as_such() {
+        let Action::Voltages(make) = CREEP.action else { unreachable!() };
+        let at = |values: &[f64], times: &[usize]| {
+            let mut creep = make(values, 1, 1000.0);
+            creep.settle(&mut [0.0]);
+            let mut found = Vec::new();
+            for step in 1..=30_000 {
+                let mut volts = [1000.0];
+                creep.pass(1e-3, &mut volts);
+                if times.contains(&step) {
+                    found.push(volts[0] - 1000.0);
+                }
+            }
+            found
+        };
+        let fine = at(&[0.02, 0.0, 4.0, 0.01], &[300, 3_000, 30_000]);
+        // Four rungs a decade: no ripple to speak of.
+        assert!(fine.windows(2).all(|pair| (pair[1] - pair[0] - 20.0).abs() < 0.02), "{fine:?}");
+        // w = c/r·T^p over rungs that are dense in log T: c·Γ(1 − p)/(p ln 10)·t^p but for a constant.
+        let power = at(&[0.02, 0.3, 4.0, 0.01], &[300, 3_000, 30_000]);
+        let ratio = (power[2] - power[1]) / (power[1] - power[0]);
+        assert!((ratio / 10_f64.powf(0.3) - 1.0).abs() < 0.01, "{power:?}");
+        // One rung: 1 − exp(−t/T).
+        let single = at(&[0.02, 0.0, 0.0, 2.0], &[2_000]);
+        assert!((single[0] - 20.0 * -(-1.0_f64).exp_m1()).abs() < 0.01, "{single:?}");
     }
 }

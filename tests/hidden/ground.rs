@@ -1,0 +1,189 @@
+//! Measured data of a robot on the floor, made by the Bullet engine: the candidates run on the planar one, with another contact and another
+//! time stepping. What is hidden in the voltages and in the camera has equations of its own, here.
+//!
+//! Three actuators crawl over the floor in ten runs, by waves of different speed, height and direction.
+
+#![allow(dead_code)] // every test uses a part of it
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+use std::path::Path;
+
+use rayon::prelude::*;
+use sfers::engine::{BulletEngine, Engine};
+use sfers::experiment::{self, Source};
+use sfers::model::Robot;
+
+use super::generator::effects::Random;
+use super::generator::protocol::Plays;
+
+/// Bullet's step (s): half of what its explicit torque law stands.
+const STEP: f64 = 2e-5;
+/// Rows are so many steps apart, 5 ms.
+const STEPS_PER_ROW: usize = 250;
+const ROWS: usize = 241;
+/// Rows that the robot is left alone on the floor before a run.
+const REST: usize = 80;
+const ACTUATORS: usize = 3;
+/// Markers along the robot (cm).
+const MARKERS: [(&str, f64); 3] = [("left", 0.0), ("middle", 15.0), ("right", 30.0)];
+
+const ROBOT: &str = r#"
+[material]
+preset = "parameter-2"
+
+[robot]
+actuators = 3
+motors_per_actuator = 3
+mount = "ground"
+damping_eta = 0.045
+
+[robot.friction]
+low = 0.3
+high = 0.9
+film = "right-end"
+"#;
+
+/// A wave of voltages along the robot.
+pub struct Wave {
+    pub id: &'static str,
+    pub hertz: f64,
+    pub volts: f64,
+    /// Phase from one actuator to the next, in turns.
+    pub phase: f64,
+}
+
+const fn wave(id: &'static str, hertz: f64, volts: f64, phase: f64) -> Wave {
+    Wave { id, hertz, volts, phase }
+}
+
+pub const WAVES: [Wave; 10] = [
+    wave("forward-2hz", 2.0, -1200.0, 0.25),
+    wave("forward-3hz", 3.0, -800.0, 0.25),
+    wave("forward-4hz", 4.0, -1200.0, 0.25),
+    wave("forward-6hz", 6.0, -700.0, 0.25),
+    wave("backward-2hz", 2.0, -900.0, -0.25),
+    wave("backward-3hz", 3.0, -1200.0, -0.25),
+    wave("backward-5hz", 5.0, -1000.0, -0.25),
+    wave("bound-2hz", 2.0, -1000.0, 0.0),
+    wave("bound-4hz", 4.0, -600.0, 0.0),
+    wave("ripple-3hz", 3.0, -1000.0, 0.4),
+];
+
+impl Wave {
+    /// Voltage of an actuator (from 0); it swells from nothing within 0.3 s.
+    pub fn volts(&self, t: f64, actuator: usize) -> f64 {
+        let swell = (t / 0.3).clamp(0.0, 1.0);
+        let swell = swell * swell * (3.0 - 2.0 * swell);
+        swell * 0.5 * self.volts * (1.0 - (TAU * (self.hertz * t - self.phase * actuator as f64)).cos())
+    }
+}
+
+/// What is hidden; the default is nothing.
+#[derive(Clone)]
+pub struct Floor {
+    pub friction: f64,
+    pub slope_deg: f64,
+    /// Gain of every actuator.
+    pub gains: [f64; ACTUATORS],
+    pub delay_s: f64,
+    pub hysteresis: f64,
+    pub tilt_deg: f64,
+}
+
+impl Default for Floor {
+    fn default() -> Self {
+        Self { friction: 1.0, slope_deg: 0.0, gains: [1.0; ACTUATORS], delay_s: 0.0, hysteresis: 0.0, tilt_deg: 0.0 }
+    }
+}
+
+/// Markers of a run without noise: x and z of each in mm, row after row.
+pub type Film = Vec<[f64; 2 * MARKERS.len()]>;
+
+/// The robot as it is on the bench.
+pub fn robot(hidden: &Floor) -> Robot {
+    let text = format!("{ROBOT}\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0, 0]\n\n[simulation]\ntime_step_s = 1e-5\nduration_s = 1\n");
+    let mut robot = experiment::experiment(&Source::from_text("the bench", &text)).expect("the robot of the bench").robot;
+    robot.extensions.slope = hidden.slope_deg.to_radians();
+    robot.friction.ground *= hidden.friction;
+    robot
+}
+
+/// All runs without noise.
+pub fn film(hidden: &Floor) -> Vec<Film> {
+    WAVES.par_iter().map(|wave| film_of(hidden, wave)).collect()
+}
+
+fn film_of(hidden: &Floor, wave: &Wave) -> Film {
+    let robot = robot(hidden);
+    let mut engine = BulletEngine::new(&robot, STEP).expect("a robot for Bullet");
+    let lengths: Vec<f64> = robot.segments().iter().map(|segment| segment.length).collect();
+    let mut nodes = vec![0.0; 3 * (lengths.len() + 1)];
+    let mut rates = nodes.clone();
+    let mut plays: Vec<Plays> = (0..ACTUATORS).map(|_| Plays::new(hidden.hysteresis, 0.0)).collect();
+    let mut film = Film::new();
+    for step in 0..=(REST + ROWS - 1) * STEPS_PER_ROW {
+        // Bullet applies a torque over the step that follows: the voltage is that of the step's middle.
+        let t = (step as f64 + 0.5) * STEP - (REST * STEPS_PER_ROW) as f64 * STEP;
+        let volts: Vec<f64> = (0..ACTUATORS)
+            .map(|k| hidden.gains[k] * plays[k].follow(wave.volts(t - hidden.delay_s, k)))
+            .collect();
+        engine.prepare(&volts).expect("a step");
+        if step % STEPS_PER_ROW == 0 && step >= REST * STEPS_PER_ROW {
+            engine.nodes(&mut nodes, &mut rates).expect("where the nodes are");
+            film.push(seen(hidden, &lengths, &nodes));
+        }
+        engine.advance().expect("a step");
+    }
+    film
+}
+
+/// The markers on the camera's picture.
+fn seen(hidden: &Floor, lengths: &[f64], nodes: &[f64]) -> [f64; 2 * MARKERS.len()] {
+    let (sin, cos) = hidden.tilt_deg.to_radians().sin_cos();
+    let mut row = [0.0; 2 * MARKERS.len()];
+    for (at, (_, arc)) in row.chunks_exact_mut(2).zip(MARKERS) {
+        let (mut link, mut left) = (0, arc);
+        while link + 1 < lengths.len() && left > lengths[link] {
+            left -= lengths[link];
+            link += 1;
+        }
+        let share = left / lengths[link];
+        let [x, z] = [0, 2].map(|axis| nodes[3 * link + axis] * (1.0 - share) + nodes[3 * link + 3 + axis] * share);
+        let (x, z) = (10.0 * (x + 0.5 * lengths[0]), 10.0 * z);
+        (at[0], at[1]) = (x * cos - z * sin, x * sin + z * cos);
+    }
+    row
+}
+
+/// Root mean square of the difference of two films (mm).
+pub fn trace(a: &[Film], b: &[Film]) -> f64 {
+    let pairs = a.iter().flatten().flatten().zip(b.iter().flatten().flatten());
+    let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), (x, y)| (sum + (x - y) * (x - y), count + 1.0));
+    f64::sqrt(sum / count)
+}
+
+/// Writes dataset.toml and the CSV files of films, with noise.
+pub fn write(folder: &Path, films: &[Film], noise_mm: f64, seed: u64) {
+    let mut text = format!("[dataset]\nname = \"floor\"\n{ROBOT}\n[markers]\n");
+    for (name, arc) in MARKERS {
+        let _ = writeln!(text, "{name} = {}", 10.0 * arc);
+    }
+    let _ = writeln!(text, "\n[noise]\ndefault_mm = {noise_mm}");
+    let mut random = Random::new(seed, "camera over the floor");
+    for (wave, film) in WAVES.iter().zip(films) {
+        let _ = write!(text, "\n[[run]]\nid = \"{0}\"\nfile = \"{0}.csv\"\n", wave.id);
+        let mut table = String::from("t_s,v1_v,v2_v,v3_v");
+        MARKERS.iter().for_each(|(name, _)| _ = write!(table, ",{name}_x_mm,{name}_z_mm"));
+        table.push('\n');
+        for (row, markers) in film.iter().enumerate() {
+            let t = row as f64 * STEPS_PER_ROW as f64 * STEP;
+            let _ = write!(table, "{t:.4}");
+            (0..ACTUATORS).for_each(|k| _ = write!(table, ",{:.3}", wave.volts(t, k)));
+            markers.iter().for_each(|value| _ = write!(table, ",{:.4}", value + noise_mm * random.normal()));
+            table.push('\n');
+        }
+        std::fs::write(folder.join(format!("{}.csv", wave.id)), table).expect("the CSV of a run");
+    }
+    std::fs::write(folder.join("dataset.toml"), text).expect("dataset.toml");
+}
