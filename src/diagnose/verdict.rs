@@ -516,14 +516,23 @@ fn adopted(
     tied_with.sort();
     tied_with.dedup();
     tied_with.retain(|id| id != candidate.id);
+    // Which actuator it is was found by trying all of them; other given numbers tell the form of the equation.
+    let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().partition(|(name, _)| *name == "actuator");
+    let which = found_by_trying.into_iter().map(|(name, value)| Estimate {
+        name: (*name).to_owned(),
+        value: *value,
+        unit: String::new(),
+        ci95: [Some(*value); 2],
+        at_bound: false,
+    });
     Ok(Adopted {
         id: candidate.id.to_owned(),
         kind: candidate.kind.to_owned(),
         cause: candidate.cause.to_owned(),
-        parameters: estimates(search, index, term, found),
+        parameters: which.chain(estimates(search, index, term, found)).collect(),
         tied_with,
         gain_heldout: gain(search, best, &without),
-        fixed: candidate.fixed.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+        fixed: form.into_iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
     })
 }
 
@@ -623,6 +632,7 @@ fn summary(verdict: Verdict, effects: &[Adopted], left: f64, poor: Option<&str>,
             .iter()
             .map(|p| {
                 let range = match p.ci95 {
+                    [Some(low), Some(high)] if low == high => return format!("{} = {}", p.name, p.value),
                     [Some(low), Some(high)] => format!(" ({low:.4} to {high:.4})"),
                     _ => String::new(),
                 };
