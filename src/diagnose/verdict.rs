@@ -517,12 +517,12 @@ fn adopted(
     tied_with.dedup();
     tied_with.retain(|id| id != candidate.id);
     // Which actuator it is was found by trying all of them; other given numbers tell the form of the equation.
-    let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().partition(|(name, _)| *name == "actuator");
+    let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().copied().partition(|(name, _)| *name == "actuator");
     let which = found_by_trying.into_iter().map(|(name, value)| Estimate {
-        name: (*name).to_owned(),
-        value: *value,
+        name: name.to_owned(),
+        value,
         unit: String::new(),
-        ci95: [Some(*value); 2],
+        ci95: [Some(value); 2],
         at_bound: false,
     });
     Ok(Adopted {
@@ -532,7 +532,7 @@ fn adopted(
         parameters: which.chain(estimates(search, index, term, found)).collect(),
         tied_with,
         gain_heldout: gain(search, best, &without),
-        fixed: form.into_iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+        fixed: form.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
     })
 }
 
