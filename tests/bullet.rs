@@ -1,16 +1,19 @@
 //! The safe layer over Bullet: misuse is an error, and simple bodies move as mechanics says.
 
-use sfers::bullet::{BaseState, BoxLink, BulletError, Ground, SolverSettings, World};
+use sfers::bullet::{BaseState, BoxLink, BulletError, Ground, SolverSettings, World, Wrench};
 
 fn cube(parent: Option<usize>) -> BoxLink {
     BoxLink {
         parent,
         mass: 2.0,
+        inertia: None,
         half_extents: [0.5; 3],
+        com_to_box: [0.0; 3],
         parent_com_to_joint: [0.5, 0.0, 0.0],
         joint_to_com: [0.5, 0.0, 0.0],
         axis: [0.0, 1.0, 0.0],
         friction: 0.5,
+        restitution: 0.0,
         collision_margin: 0.001,
     }
 }
@@ -20,7 +23,8 @@ fn world() -> World {
 }
 
 fn ground(world: &mut World) {
-    let floor = Ground { half_extents: [1000.0, 1000.0, 50.0], top: 0.0, friction: 1.0, collision_margin: 0.001 };
+    let floor =
+        Ground { half_extents: [1000.0, 1000.0, 50.0], top: 0.0, friction: 1.0, restitution: 0.0, collision_margin: 0.001 };
     world.add_ground(&floor).unwrap();
 }
 
@@ -43,6 +47,9 @@ fn bodies_that_cannot_be_are_refused_and_the_world_stays_usable() {
         (BoxLink { friction: f64::NAN, ..cube(None) }, vec![]),
         (cube(None), vec![BoxLink { axis: [0.0, 2.0, 0.0], ..cube(None) }]),
         (cube(None), vec![cube(Some(0))]),
+        (BoxLink { restitution: 1.5, ..cube(None) }, vec![]),
+        (BoxLink { inertia: Some([1.0, 0.0, 1.0]), ..cube(None) }, vec![]),
+        (BoxLink { com_to_box: [f64::NAN, 0.0, 0.0], ..cube(None) }, vec![]),
         (cube(None), vec![cube(None), cube(Some(5))]),
     ] {
         assert!(world.add_multibody(&base, &links, none).is_err());
@@ -63,6 +70,14 @@ fn wrong_lengths_steps_and_foreign_bodies_are_errors() {
     assert!(world.set_joint_states(body, &[f64::NAN], &[0.0]).is_err());
     assert_eq!(world.base_state(foreign), Err(BulletError::ForeignBody));
     assert!(world.add_fixed_constraint(body, 0.0).is_err());
+    assert!(world.add_sprung_constraint(body, [0.0; 3], 0.0, 500.0).is_err());
+    assert!(world.add_sprung_constraint(body, [f64::NAN; 3], 1e-7, 500.0).is_err());
+    assert!(matches!(other.add_sprung_constraint(foreign, [0.0; 3], 1e-7, 500.0), Err(BulletError::Refused(_))));
+    assert_eq!(world.add_forces(body, &[Wrench::default()]), Err(BulletError::Length { what: "forces", found: 1, needed: 2 }));
+    assert!(world.add_forces(body, &[Wrench { force: [f64::NAN; 3], torque: [0.0; 3] }; 2]).is_err());
+    assert_eq!(world.set_frictions(body, &[1.0; 3]), Err(BulletError::Length { what: "frictions", found: 3, needed: 2 }));
+    assert!(world.set_frictions(body, &[1.0, -1.0]).is_err());
+    assert_eq!(world.set_frictions(foreign, &[1.0]), Err(BulletError::ForeignBody));
     for step in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(world.step(step), Err(BulletError::Value { .. })), "{step}");
     }

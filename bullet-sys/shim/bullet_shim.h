@@ -21,7 +21,7 @@ extern "C" {
 /* ---- identity ------------------------------------------------------------------------------------------------------ */
 
 /* Raised whenever a signature, a structure or a constant of this header changes. */
-#define BS_ABI_VERSION 2
+#define BS_ABI_VERSION 3
 
 #define BS_OK 0
 #define BS_ERROR_ARGUMENT 1  /* a null pointer, a wrong length, an index out of range, a value that Bullet would assert on */
@@ -75,14 +75,18 @@ int32_t bs_world_set_gravity(bs_world *world, const double *gravity);
 
 /* ---- multibody ----------------------------------------------------------------------------------------------------- */
 
-/* One body of a tree: a box whose centre of mass is its centre. The base is a bs_link too; it has no joint. */
+/* One body of a tree: a box on a rigid body. The base is a bs_link too; it has no joint. */
 typedef struct bs_link {
-  double mass;                    /* (g); the inertia is Bullet's own for the box */
+  double mass;                    /* (g) */
+  double inertia[3];              /* about the centre of mass, along the box's axes (g cm^2); all 0: Bullet's own for the box */
   double half_extents[3];         /* of the collision box (cm) */
+  double com_to_box[3];           /* from the centre of mass to the box's centre (cm), in this body's frame */
   double parent_com_to_joint[3];  /* from the parent's centre of mass to the joint (cm), in the parent's frame */
   double joint_to_com[3];         /* from the joint to this body's centre of mass (cm), in this body's frame */
   double axis[3];                 /* hinge axis, unit, in this body's frame */
   double friction;                /* lateral friction of the collider (-) */
+  double restitution;             /* of the collider (-); a contact has the product of its two. Chains bounce with it exactly, other
+                                   * bodies as Bullet has it, with the push out of the overlap on top */
   double collision_margin;        /* (cm) */
   int32_t parent;                 /* index of the parent link, -1 for the base */
   int32_t reserved;               /* 0 */
@@ -96,11 +100,17 @@ int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *li
 
 /* Adds a static ground: a multibody without links, fixed, whose collider is a compound with one box.
  * half_extents: 3 values (cm). top: height (z, cm) of the origin, which lies at the centre of the box's upper face. */
-int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, double friction, double collision_margin,
-                      int32_t *body, char *error, int32_t error_length);
+int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, double friction, double restitution,
+                      double collision_margin, int32_t *body, char *error, int32_t error_length);
 
 /* Ties the base of `body` to the world where it stands, with a 6-row constraint of at most `max_impulse` (dyn s) a row. */
 int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impulse, char *error, int32_t error_length);
+
+/* The same with a tie that gives: the base may turn about its y axis, at `pivot` (3 values, cm, in the base's frame), by `compliance`
+ * (rad/(dyn cm)) times the moment on it. The spring is implicit, so that no compliance is too small for a step.
+ * body: a chain, each link hanging on the one before it. */
+int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double max_impulse, char *error,
+                                 int32_t error_length);
 
 /* Reads all joints at once. angles (rad), rates (rad/s): `length` values each, one per link. */
 int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length);
@@ -110,6 +120,14 @@ int32_t bs_joint_states_set(bs_world *world, int32_t body, const double *angles,
 
 /* Sets the torque (dyn cm) on every joint for the coming step. torques: `length` values. */
 int32_t bs_joint_torques_set(bs_world *world, int32_t body, const double *torques, int32_t length);
+
+/* Adds forces for the coming step. forces: 6 values per body, the base first: force on the centre of mass (3, dyn) and torque (3, dyn cm),
+ * in the world's axes. length: 6 times the number of bodies. */
+int32_t bs_forces_add(bs_world *world, int32_t body, const double *forces, int32_t length);
+
+/* Sets the lateral friction of all colliders of `body`, the base's first, and of the contact points that they have. frictions: `length`
+ * values, one per body. Like the solver's settings they are not part of a snapshot. */
+int32_t bs_frictions_set(bs_world *world, int32_t body, const double *frictions, int32_t length);
 
 /* Base: centre of mass (cm), orientation (quaternion, base to world), velocity (cm/s) and angular velocity (rad/s).
  * state: 13 values. Current, unlike bs_link_states. */
@@ -159,7 +177,7 @@ int32_t bs_snapshot_size(const bs_world *world, int32_t *size);
 int32_t bs_snapshot_take(const bs_world *world, double *data, int32_t length, char *error, int32_t error_length);
 
 /* Puts the world back, so that it continues with the same bits. The world may be another one, built by the same calls.
- * Gravity and pending torques come back too. length: exactly that of the snapshot. A snapshot of another make-up is refused before
+ * Gravity and pending torques and forces come back too. length: exactly that of the snapshot. A snapshot of another make-up is refused before
  * anything changes; after BS_ERROR_MEMORY or BS_ERROR_INTERNAL destroy the world. */
 int32_t bs_snapshot_restore(bs_world *world, const double *data, int32_t length, char *error, int32_t error_length);
 

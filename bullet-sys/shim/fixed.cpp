@@ -6,10 +6,16 @@ namespace bs {
 
 static constexpr int ROWS = 6;
 static constexpr int BASE = -1;
+static constexpr int TURN_ABOUT_Y = 4;  // of the rows
 
 FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world)
     : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), btVector3(0, 0, 0), world.getOrigin(),
                                  btMatrix3x3::getIdentity(), world.getBasis()) {}
+
+FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance)
+    : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), pivot, world(pivot), btMatrix3x3::getIdentity(),
+                                 world.getBasis()),
+      compliance_(compliance) {}
 
 void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
                                            const btContactSolverInfo &info) {
@@ -68,7 +74,14 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
     const btScalar error = i < 3 ? offset.dot(row.linear) : turned[i % 3];
     const btScalar position = -error * info.m_erp / info.m_timeStep, velocity = -row.velocity;
     out.m_rhs = position * out.m_jacDiagABInv + velocity * out.m_jacDiagABInv;
-    out.m_rhsPenetration = out.m_cfm = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
+    out.m_cfm = 0;
+    if (compliance_ > 0 && i == TURN_ABOUT_Y) {
+      const btScalar softness = compliance_ / (info.m_timeStep * info.m_timeStep);
+      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
+      out.m_cfm = softness * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - error / info.m_timeStep) * out.m_jacDiagABInv;
+    }
+    out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;
     out.m_upperLimit = m_maxAppliedImpulse;
   }

@@ -73,6 +73,13 @@ struct Body {
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::unique_ptr<btMultiBody> multibody;
   std::vector<std::unique_ptr<btMultiBodyLinkCollider>> colliders;
+  // What the body was built with, of the base first.
+  std::vector<double> frictions;
+  std::vector<btVector3> com_to_box;
+  bool has_offsets = false;  // whether any of com_to_box is not zero
+
+  // Puts the colliders where the boxes are; Bullet puts them at the centres of mass.
+  void move_colliders();
 };
 
 inline btVector3 vector(const double *v) { return btVector3(v[0], v[1], v[2]); }
@@ -90,10 +97,11 @@ struct bs_world {
   bs_world(const bs_world &) = delete;
   bs_world &operator=(const bs_world &) = delete;
 
-  btMultiBody &multibody(int32_t body) const {
-    bs::require(body >= 0 && static_cast<size_t>(body) < bodies.size(), "no multibody of that index");
-    return *bodies[static_cast<size_t>(body)].multibody;
+  const bs::Body &body(int32_t index) const {
+    bs::require(index >= 0 && static_cast<size_t>(index) < bodies.size(), "no multibody of that index");
+    return bodies[static_cast<size_t>(index)];
   }
+  btMultiBody &multibody(int32_t index) const { return *body(index).multibody; }
 
   // Destroyed in reverse: the dynamics world first, then what it refers to.
   btDefaultCollisionConfiguration configuration;
@@ -103,7 +111,7 @@ struct bs_world {
   bs::Solver solver;
   btMultiBodyDynamicsWorld dynamics;
   std::vector<bs::Body> bodies;
-  std::vector<std::unique_ptr<btMultiBodyConstraint>> constraints;
+  std::vector<std::unique_ptr<bs::FixedConstraint>> constraints;
   // Scratch of the velocity read-out: grows with the largest body, then stays.
   std::vector<btVector3> scratch_linear, scratch_angular;
 };

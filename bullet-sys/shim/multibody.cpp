@@ -1,11 +1,16 @@
 // Multibodies: building them in the order that PyBullet uses (it decides the order of contacts and so the last bits), and
 // reading and writing their state.
+#include <cmath>
+
+#include "BulletCollision/CollisionDispatch/btManifoldResult.h"
 #include "internal.h"
 
 namespace {
 
 using bs::Body;
 using bs::require;
+
+bool is_finite(const double *v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 
 std::unique_ptr<btBoxShape> box(const double *half_extents, double margin) {
   for (int i = 0; i < 3; ++i) require(half_extents[i] > 0, "a half extent must be positive");
@@ -14,9 +19,9 @@ std::unique_ptr<btBoxShape> box(const double *half_extents, double margin) {
   return shape;
 }
 
-btVector3 inertia_of(const btCollisionShape &shape, double mass) {
-  btVector3 inertia(0, 0, 0);
-  shape.calculateLocalInertia(mass, inertia);
+btVector3 inertia_of(const btCollisionShape &shape, const bs_link &link) {
+  btVector3 inertia = bs::vector(link.inertia);
+  if (inertia.isZero()) shape.calculateLocalInertia(link.mass, inertia);
   return inertia;
 }
 
@@ -54,6 +59,7 @@ void finish(bs_world &world, Body &body, const btVector3 &base_position) {
   btAlignedObjectArray<btVector3> scratch_origins;
   multibody.forwardKinematics(scratch_rotations, scratch_origins);
   multibody.updateCollisionObjectWorldTransforms(scratch_rotations, scratch_origins);
+  body.move_colliders();
   world.dynamics.addMultiBody(&multibody);
   multibody.setLinearDamping(0);
   multibody.setAngularDamping(0);
@@ -83,11 +89,34 @@ class Building {
 
 void check(const bs_link &link) {
   require(link.mass > 0, "a mass must be positive");
+  const btVector3 inertia = bs::vector(link.inertia);
+  require(is_finite(link.inertia), "moments of inertia must be finite");
+  require(inertia.isZero() || (inertia.x() > 0 && inertia.y() > 0 && inertia.z() > 0), "moments of inertia must be positive, or all zero");
+  require(is_finite(link.com_to_box), "an offset must be finite");
+  require(link.restitution >= 0 && link.restitution <= 1, "a coefficient of restitution must be from 0 to 1");
   require(link.collision_margin > 0, "a collision margin must be positive");
   require(link.friction >= 0, "a friction coefficient must not be negative");
 }
 
+// Links that hang each on the one before it.
+bool is_chain(const btMultiBody &body) {
+  for (int i = 0; i < body.getNumLinks(); ++i) {
+    if (body.getParent(i) != i - 1) return false;
+  }
+  return body.getNumLinks() > 0;
+}
+
 }  // namespace
+
+void bs::Body::move_colliders() {
+  if (!has_offsets) return;
+  for (size_t i = 0; i < colliders.size(); ++i) {
+    btTransform transform = colliders[i]->getWorldTransform();
+    transform.setOrigin(transform(com_to_box[i]));
+    colliders[i]->setWorldTransform(transform);
+    colliders[i]->setInterpolationWorldTransform(transform);
+  }
+}
 
 extern "C" {
 
@@ -107,7 +136,7 @@ int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *li
     Building building(*world);
     Body &body = building.body();
     body.shapes.push_back(box(base->half_extents, base->collision_margin));
-    body.multibody = std::make_unique<btMultiBody>(link_count, base->mass, inertia_of(*body.shapes[0], base->mass), false, false);
+    body.multibody = std::make_unique<btMultiBody>(link_count, base->mass, inertia_of(*body.shapes[0], *base), false, false);
     btMultiBody &multibody = *body.multibody;
     multibody.setBaseWorldTransform(btTransform::getIdentity());
     const btVector3 origin = bs::vector(base_position);
@@ -122,27 +151,36 @@ int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *li
       const bs_link &link = links[i];
       body.shapes.push_back(box(link.half_extents, link.collision_margin));
       btCollisionShape &shape = *body.shapes.back();
-      multibody.setupRevolute(i, link.mass, inertia_of(shape, link.mass), link.parent, btQuaternion(0, 0, 0, 1), bs::vector(link.axis),
+      multibody.setupRevolute(i, link.mass, inertia_of(shape, link), link.parent, btQuaternion(0, 0, 0, 1), bs::vector(link.axis),
                               bs::vector(link.parent_com_to_joint), bs::vector(link.joint_to_com), true);
       const size_t parent = static_cast<size_t>(link.parent + 1);
       frames.push_back(frames[parent] + (to_centre[parent] + bs::vector(link.parent_com_to_joint)));
       to_centre.push_back(bs::vector(link.joint_to_com));
       add_collider(*world, body, i, shape, frames.back(), false);
     }
+    for (int32_t i = -1; i < link_count; ++i) {
+      const bs_link &link = i < 0 ? *base : links[i];
+      body.com_to_box.push_back(bs::vector(link.com_to_box));
+      body.has_offsets |= !body.com_to_box.back().isZero();
+      body.frictions.push_back(link.friction);
+    }
     finish(*world, body, origin);
     // Frictions after everything else, base first, as the reference sets them.
-    body.colliders[0]->setFriction(base->friction);
-    for (int32_t i = 0; i < link_count; ++i) body.colliders[static_cast<size_t>(i) + 1]->setFriction(links[i].friction);
+    for (size_t i = 0; i < body.colliders.size(); ++i) {
+      body.colliders[i]->setFriction(body.frictions[i]);
+      body.colliders[i]->setRestitution(i == 0 ? base->restitution : links[i - 1].restitution);
+    }
     *body_index = building.commit();
   });
 }
 
-int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, double friction, double collision_margin,
-                      int32_t *body_index, char *error, int32_t error_length) {
+int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, double friction, double restitution,
+                      double collision_margin, int32_t *body_index, char *error, int32_t error_length) {
   return bs::guarded(error, error_length, [&] {
     require(world != nullptr && half_extents != nullptr && body_index != nullptr, "null pointer");
     require(collision_margin > 0, "a collision margin must be positive");
     require(friction >= 0, "a friction coefficient must not be negative");
+    require(restitution >= 0 && restitution <= 1, "a coefficient of restitution must be from 0 to 1");
     Building building(*world);
     Body &body = building.body();
     body.shapes.push_back(box(half_extents, collision_margin));
@@ -159,6 +197,8 @@ int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, d
     add_collider(*world, body, -1, shape, origin, true);
     finish(*world, body, origin);
     body.colliders[0]->setFriction(friction);
+    body.colliders[0]->setRestitution(restitution);
+    body.frictions.push_back(friction);
     *body_index = building.commit();
   });
 }
@@ -169,6 +209,23 @@ int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impuls
     require(max_impulse > 0, "the largest impulse must be positive");
     btMultiBody &multibody = world->multibody(body);
     auto constraint = std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform());
+    constraint->setMaxAppliedImpulse(max_impulse);
+    world->constraints.push_back(std::move(constraint));
+    world->dynamics.addMultiBodyConstraint(world->constraints.back().get());
+  });
+}
+
+int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double max_impulse, char *error,
+                                 int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(world != nullptr && pivot != nullptr, "null pointer");
+    require(max_impulse > 0, "the largest impulse must be positive");
+    require(compliance > 0 && std::isfinite(compliance), "a compliance must be positive and finite");
+    require(is_finite(pivot), "a pivot must be finite");
+    btMultiBody &multibody = world->multibody(body);
+    require(is_chain(multibody), "a tie that gives needs a chain");
+    auto constraint =
+        std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform(), bs::vector(pivot), compliance);
     constraint->setMaxAppliedImpulse(max_impulse);
     world->constraints.push_back(std::move(constraint));
     world->dynamics.addMultiBodyConstraint(world->constraints.back().get());
@@ -205,6 +262,36 @@ int32_t bs_joint_torques_set(bs_world *world, int32_t body, const double *torque
     btMultiBody &multibody = world->multibody(body);
     require(length == multibody.getNumLinks(), "one value per link");
     for (int i = 0; i < length; ++i) multibody.getLink(i).m_jointTorque[0] = torques[i];
+  });
+}
+
+int32_t bs_forces_add(bs_world *world, int32_t body, const double *forces, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && forces != nullptr, "null pointer");
+    btMultiBody &multibody = world->multibody(body);
+    require(length == 6 * (multibody.getNumLinks() + 1), "6 values per body");
+    multibody.addBaseForce(bs::vector(forces));
+    multibody.addBaseTorque(bs::vector(forces + 3));
+    for (int i = 0; i < multibody.getNumLinks(); ++i) {
+      multibody.addLinkForce(i, bs::vector(forces + 6 * i + 6));
+      multibody.addLinkTorque(i, bs::vector(forces + 6 * i + 9));
+    }
+  });
+}
+
+int32_t bs_frictions_set(bs_world *world, int32_t body, const double *frictions, int32_t length) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr && frictions != nullptr, "null pointer");
+    const auto &colliders = world->body(body).colliders;
+    require(length >= 0 && static_cast<size_t>(length) == colliders.size(), "one value per body");
+    for (int i = 0; i < length; ++i) require(frictions[i] >= 0, "a friction coefficient must not be negative");
+    for (int i = 0; i < length; ++i) colliders[static_cast<size_t>(i)]->setFriction(frictions[i]);
+    // Points that the next step does not find anew keep what they have.
+    for (int m = 0; m < world->dispatcher.getNumManifolds(); ++m) {
+      btPersistentManifold &manifold = *world->dispatcher.manifolds()[m];
+      const btScalar friction = btManifoldResult::calculateCombinedFriction(manifold.getBody0(), manifold.getBody1());
+      for (int p = 0; p < manifold.getNumContacts(); ++p) manifold.getContactPoint(p).m_combinedFriction = friction;
+    }
   });
 }
 

@@ -34,10 +34,12 @@ State capture(bs_world &world) {
     body.rotation = multibody.getWorldToBaseRot();
     body.velocity = multibody.getBaseVel();
     body.omega = multibody.getBaseOmega();
+    body.applied_force = multibody.getBaseForce();
+    body.applied_torque = multibody.getBaseTorque();
     for (int i = 0; i < multibody.getNumLinks(); ++i) {
       const btMultibodyLink &link = multibody.getLink(i);
       body.joints.push_back({multibody.getJointPos(i), multibody.getJointVel(i), link.m_jointTorque[0],
-                             link.m_cachedRotParentToThis, link.m_cachedRVector, link.m_cachedWorldTransform});
+                             link.m_appliedForce, link.m_appliedTorque, link.m_cachedRotParentToThis, link.m_cachedRVector, link.m_cachedWorldTransform});
     }
     state.bodies.push_back(std::move(body));
   }
@@ -197,12 +199,17 @@ void apply(const Body &body, btMultiBody &multibody) {
   multibody.setWorldToBaseRot(body.rotation);
   multibody.setBaseVel(body.velocity);
   multibody.setBaseOmega(body.omega);
+  multibody.clearForcesAndTorques();
+  multibody.addBaseForce(body.applied_force);
+  multibody.addBaseTorque(body.applied_torque);
   for (int i = 0; i < multibody.getNumLinks(); ++i) {
     const Joint &joint = body.joints[static_cast<size_t>(i)];
     multibody.setJointPos(i, joint.angle);
     multibody.setJointVel(i, joint.rate);
     btMultibodyLink &link = multibody.getLink(i);
     link.m_jointTorque[0] = joint.torque;
+    link.m_appliedForce = joint.applied_force;
+    link.m_appliedTorque = joint.applied_torque;
     link.m_cachedRotParentToThis = joint.rotation;
     link.m_cachedRVector = joint.offset;
     link.m_cachedWorldTransform = joint.transform;

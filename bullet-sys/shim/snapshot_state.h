@@ -14,16 +14,18 @@ namespace bs {
 namespace snapshot {
 
 constexpr double MAGIC = 0x4253534e41;  // "BSSNA"
-constexpr double FORMAT = 1;
+constexpr double FORMAT = 2;
 
 struct Joint {
   double angle = 0, rate = 0, torque = 0;
+  btVector3 applied_force{0, 0, 0}, applied_torque{0, 0, 0};
   btQuaternion rotation{0, 0, 0, 1};                   // m_cachedRotParentToThis
   btVector3 offset{0, 0, 0};                           // m_cachedRVector
   btTransform transform = btTransform::getIdentity();  // m_cachedWorldTransform, one step behind
 };
 struct Body {
   btVector3 position{0, 0, 0}, velocity{0, 0, 0}, omega{0, 0, 0};
+  btVector3 applied_force{0, 0, 0}, applied_torque{0, 0, 0};
   btQuaternion rotation{0, 0, 0, 1};  // world to base, as stored
   std::vector<Joint> joints;
 };
@@ -128,8 +130,8 @@ inline int index_of(const btBroadphaseProxy &proxy) {
   return static_cast<btCollisionObject *>(proxy.m_clientObject)->getWorldArrayIndex();
 }
 
-// A number that differs between worlds whose bodies differ, 52 bits of FNV-1a over masses, frames, boxes and frictions. The
-// solver's settings are not in it: a snapshot may be continued under others.
+// A number that differs between worlds whose bodies differ, 52 bits of FNV-1a over masses, frames, boxes, frictions
+// (those they were built with), restitutions and constraints. The solver's settings are not in it: a snapshot may be continued under others.
 inline double fingerprint(const bs_world &world) {
   uint64_t hash = 14695981039346656037u;
   auto mix = [&hash](double value) {
@@ -147,14 +149,18 @@ inline double fingerprint(const bs_world &world) {
       mix(link.m_mass), mix(link.m_parent);
       mix3(link.m_inertiaLocal), mix3(link.m_dVector), mix3(link.m_eVector), mix3(link.getAxisTop(0));
     }
+    for (const btVector3 &offset : body.com_to_box) mix3(offset);
+    for (double friction : body.frictions) mix(friction);
     for (const auto &collider : body.colliders) {
       btVector3 minima, maxima;
       collider->getCollisionShape()->getAabb(btTransform::getIdentity(), minima, maxima);
       mix3(minima), mix3(maxima);
-      mix(collider->getCollisionShape()->getMargin()), mix(collider->getFriction());
+      mix(collider->getCollisionShape()->getMargin()), mix(collider->getRestitution());
     }
   }
-  for (const auto &constraint : world.constraints) mix(constraint->getMaxAppliedImpulse());
+  for (const auto &constraint : world.constraints) {
+    mix(constraint->getMaxAppliedImpulse()), mix(constraint->compliance()), mix3(constraint->pivot());
+  }
   return static_cast<double>(hash >> 12);
 }
 
@@ -193,9 +199,11 @@ inline void visit(Fields &fields, const bs_world &world, State &state) {
     const int links = world.bodies[b].multibody->getNumLinks();
     fields.same(links, "the snapshot has another number of links");
     fields(body.position), fields(body.rotation), fields(body.velocity), fields(body.omega);
+    fields(body.applied_force), fields(body.applied_torque);
     body.joints.resize(static_cast<size_t>(links));
     for (Joint &joint : body.joints) {
       fields.real(joint.angle), fields.real(joint.rate), fields.real(joint.torque);
+      fields(joint.applied_force), fields(joint.applied_torque);
       fields(joint.rotation), fields(joint.offset), fields(joint.transform);
     }
   }

@@ -173,7 +173,10 @@ void Solver::fill(btMultiBodySolverConstraint &out, const Chain::Row &a, const C
     const btScalar restitution = restitutionCurve(b.velocity, point.m_combinedRestitution, info.m_restitutionVelocityThreshold);
     velocity = btMax(restitution, btScalar(0)) - b.velocity;
     const btScalar distance = point.getDistance() + info.m_linearSlop;
-    if (distance > 0) {
+    if (restitution > 0 && distance + b.velocity * info.m_timeStep <= 0) {
+      // A bounce in this step. The gap that is left, or the push out of an overlap, would change its speed by as much as the approach:
+      // both are at most what one step goes.
+    } else if (distance > 0) {
       velocity -= distance / info.m_timeStep;
     } else {
       position = -distance * info.m_erp2 / info.m_timeStep;

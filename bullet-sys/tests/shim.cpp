@@ -84,14 +84,14 @@ struct World {
 // Ground, a chain that jumps about, a crate that it pushes, and a body that is tied to the world above them.
 void fill(World &world, bool with_ground_first = true, double crate_mass = 5, double half_width = 500) {
   const double extents[3] = {half_width, half_width, 10}, chain_at[3] = {0, 0, 0.6}, crate_at[3] = {6, 0.4, 2.2}, hanging_at[3] = {0, 8, 6};
-  if (with_ground_first) CHECK(bs_ground_add(world.handle, extents, 0, 0.9, 0.01, &world.ground, nullptr, 0) == BS_OK);
+  if (with_ground_first) CHECK(bs_ground_add(world.handle, extents, 0, 0.9, 0.5, 0.01, &world.ground, nullptr, 0) == BS_OK);
   const bs_link base = box(3, 1, 0.8, 0.3, -1), crate = box(crate_mass, 0.7, 0.7, 0.7, -1);
   const auto links = chain_links();
   CHECK(bs_multibody_add(world.handle, &base, links.data(), LINKS, chain_at, &world.chain, nullptr, 0) == BS_OK);
   CHECK(bs_multibody_add(world.handle, &crate, nullptr, 0, crate_at, &world.crate, nullptr, 0) == BS_OK);
   CHECK(bs_multibody_add(world.handle, &base, links.data(), 2, hanging_at, &world.hanging, nullptr, 0) == BS_OK);
   CHECK(bs_fixed_constraint_add(world.handle, world.hanging, 1e6, nullptr, 0) == BS_OK);
-  if (!with_ground_first) CHECK(bs_ground_add(world.handle, extents, 0, 0.9, 0.01, &world.ground, nullptr, 0) == BS_OK);
+  if (!with_ground_first) CHECK(bs_ground_add(world.handle, extents, 0, 0.9, 0.5, 0.01, &world.ground, nullptr, 0) == BS_OK);
 }
 
 // Torques of a step: strokes that throw the chain off the ground and let it fall, on top of springs towards a moving pose.
@@ -214,13 +214,21 @@ void misuse() {
   CHECK(refused([](bs_link &l) { l.mass = NOT_A_NUMBER; }));
   CHECK(refused([](bs_link &l) { l.collision_margin = 0; }));
   CHECK(refused([](bs_link &l) { l.friction = -1; }));
+  CHECK(refused([](bs_link &l) { l.restitution = 1.5; }));
+  CHECK(refused([](bs_link &l) { l.restitution = NOT_A_NUMBER; }));
+  CHECK(refused([](bs_link &l) { l.inertia[1] = 1; }));
+  CHECK(refused([](bs_link &l) { l.inertia[0] = l.inertia[1] = l.inertia[2] = NOT_A_NUMBER; }));
+  CHECK(refused([](bs_link &l) { l.com_to_box[2] = NOT_A_NUMBER; }));
   CHECK(refused([](bs_link &l) { l.half_extents[1] = 0; }));  // noticed when half the body is in the world
-  CHECK(bs_ground_add(nullptr, extents, 0, 1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
-  CHECK(bs_ground_add(w, nullptr, 0, 1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
-  CHECK(bs_ground_add(w, flat, 0, 1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
-  CHECK(bs_ground_add(w, extents, 0, -1, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
-  CHECK(bs_ground_add(w, extents, 0, 1, 0, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
-  CHECK(bs_ground_add(w, extents, 0, 1, 0.1, nullptr, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(nullptr, extents, 0, 1, 0, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, nullptr, 0, 1, 0, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, flat, 0, 1, 0, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, extents, 0, -1, 0, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, extents, 0, 1, 0, 0, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_ground_add(w, extents, 0, 1, 0, 0.1, nullptr, nullptr, 0) == BS_ERROR_ARGUMENT);
+  for (double restitution : {-0.1, 1.1, NOT_A_NUMBER}) {
+    CHECK(bs_ground_add(w, extents, 0, 1, restitution, 0.1, &body, nullptr, 0) == BS_ERROR_ARGUMENT);
+  }
   CHECK(body == -7);
   CHECK(bs_world_step(w, STEP, nullptr, 0) == BS_OK);  // an empty world, after all the refusals
   CHECK(restore(world, take(world)) == BS_OK);
@@ -230,6 +238,15 @@ void misuse() {
   CHECK(bs_fixed_constraint_add(nullptr, 0, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_fixed_constraint_add(w, 4, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_fixed_constraint_add(w, 1, 0, nullptr, 0) == BS_ERROR_ARGUMENT);
+  auto sprung = [](bs_world *in, int32_t index, const double *pivot, double compliance, double impulse) {
+    return bs_sprung_constraint_add(in, index, pivot, compliance, impulse, nullptr, 0);
+  };
+  const double spoiled_pivot[3] = {0, NOT_A_NUMBER, 0};
+  CHECK(sprung(nullptr, 3, at, 1e-6, 1) == BS_ERROR_ARGUMENT && sprung(w, 3, nullptr, 1e-6, 1) == BS_ERROR_ARGUMENT);
+  CHECK(sprung(w, 4, at, 1e-6, 1) == BS_ERROR_ARGUMENT && sprung(w, 3, at, 1e-6, 0) == BS_ERROR_ARGUMENT);
+  CHECK(sprung(w, 3, at, 0, 1) == BS_ERROR_ARGUMENT && sprung(w, 3, at, NOT_A_NUMBER, 1) == BS_ERROR_ARGUMENT);
+  CHECK(sprung(w, 3, spoiled_pivot, 1e-6, 1) == BS_ERROR_ARGUMENT);
+  CHECK(sprung(w, world.crate, at, 1e-6, 1) == BS_ERROR_ARGUMENT);  // a body without links
   for (double step : {0.0, -STEP, NOT_A_NUMBER}) CHECK(bs_world_step(w, step, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_world_step(nullptr, STEP, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_world_set_gravity(w, nullptr) == BS_ERROR_ARGUMENT && bs_world_set_gravity(nullptr, at) == BS_ERROR_ARGUMENT);
@@ -238,6 +255,8 @@ void misuse() {
     CHECK(bs_joint_states(w, index, a.data(), b.data(), LINKS) == BS_ERROR_ARGUMENT);
     CHECK(bs_joint_states_set(w, index, a.data(), b.data(), LINKS) == BS_ERROR_ARGUMENT);
     CHECK(bs_joint_torques_set(w, index, a.data(), LINKS) == BS_ERROR_ARGUMENT);
+    CHECK(bs_forces_add(w, index, a.data(), 6 * (LINKS + 1)) == BS_ERROR_ARGUMENT);
+    CHECK(bs_frictions_set(w, index, a.data(), LINKS + 1) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state(w, index, a.data(), 13) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state_set(w, index, a.data(), 13) == BS_ERROR_ARGUMENT);
     CHECK(bs_link_states(w, index, a.data(), 18 * LINKS) == BS_ERROR_ARGUMENT);
@@ -247,6 +266,8 @@ void misuse() {
     CHECK(bs_joint_states(w, 1, a.data(), b.data(), LINKS + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_joint_states_set(w, 1, a.data(), b.data(), LINKS + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_joint_torques_set(w, 1, a.data(), LINKS + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_forces_add(w, 1, a.data(), 6 * (LINKS + 1) + off) == BS_ERROR_ARGUMENT);
+    CHECK(bs_frictions_set(w, 1, a.data(), LINKS + 1 + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state(w, 1, a.data(), 13 + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_base_state_set(w, 1, a.data(), 13 + off) == BS_ERROR_ARGUMENT);
     CHECK(bs_link_states(w, 1, a.data(), 18 * LINKS + off) == BS_ERROR_ARGUMENT);
@@ -255,6 +276,11 @@ void misuse() {
   CHECK(bs_joint_states(w, 1, a.data(), nullptr, LINKS) == BS_ERROR_ARGUMENT);
   CHECK(bs_joint_states_set(w, 1, nullptr, b.data(), LINKS) == BS_ERROR_ARGUMENT);
   CHECK(bs_joint_torques_set(w, 1, nullptr, LINKS) == BS_ERROR_ARGUMENT);
+  CHECK(bs_forces_add(w, 1, nullptr, 6 * (LINKS + 1)) == BS_ERROR_ARGUMENT && bs_forces_add(nullptr, 1, a.data(), 6) == BS_ERROR_ARGUMENT);
+  CHECK(bs_frictions_set(w, 1, nullptr, LINKS + 1) == BS_ERROR_ARGUMENT);
+  CHECK(bs_frictions_set(nullptr, 1, a.data(), LINKS + 1) == BS_ERROR_ARGUMENT);
+  b[LINKS] = -1;
+  CHECK(bs_frictions_set(w, 1, b.data(), LINKS + 1) == BS_ERROR_ARGUMENT);
   CHECK(bs_base_state(w, 1, nullptr, 13) == BS_ERROR_ARGUMENT && bs_base_state(nullptr, 1, a.data(), 13) == BS_ERROR_ARGUMENT);
   CHECK(bs_base_state_set(w, 1, nullptr, 13) == BS_ERROR_ARGUMENT);
   CHECK(bs_base_state_set(w, 1, a.data(), 13) == BS_ERROR_ARGUMENT);  // a quaternion of zeros
@@ -302,6 +328,103 @@ void reading_and_writing() {
   CHECK(bs_world_set_gravity(world.handle, nothing) == BS_OK);
   CHECK(bs_world_step(world.handle, STEP, nullptr, 0) == BS_OK);
   CHECK(bs_base_state(world.handle, world.crate, back.data(), 13) == BS_OK && back[9] == speed);
+}
+
+// Forces from outside, masses beside their boxes, friction and restitution of single bodies, a tie that gives.
+void beyond_plain_boxes() {
+  const double ground[3] = {500, 500, 10}, nothing[3] = {0, 0, 0}, high[3] = {0, 0, 40}, low[3] = {0, 0, 1};
+  int32_t body = -1, floor = -1;
+  Numbers state(13), wrench = {6, 0, 0, 0, 0, 0};
+  auto base_of = [&](World &world, int32_t index) { CHECK(bs_base_state(world.handle, index, state.data(), 13) == BS_OK); };
+
+  // A force of 6 on a mass of 3 for one step, then none; pending forces belong to a snapshot.
+  World free(settings());
+  const bs_link crate = box(3, 1, 1, 1, -1);
+  CHECK(bs_multibody_add(free.handle, &crate, nullptr, 0, high, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_world_set_gravity(free.handle, nothing) == BS_OK);
+  CHECK(bs_forces_add(free.handle, body, wrench.data(), 6) == BS_OK);
+  const Numbers pending = take(free);
+  for (int round = 0; round < 2; ++round) {
+    for (int step = 0; step < 2; ++step) CHECK(bs_world_step(free.handle, STEP, nullptr, 0) == BS_OK);
+    base_of(free, body);
+    CHECK(std::abs(state[7] - 2 * STEP) < 1e-15);
+    CHECK(bs_forces_add(free.handle, body, wrench.data(), 6) == BS_OK);
+    CHECK(restore(free, pending) == BS_OK);
+  }
+
+  // The same as a mass that is not at the centre of its box: the box lands before it, and the mass keeps its inertia.
+  bs_link heavy = crate;
+  heavy.com_to_box[0] = 0.4;
+  heavy.inertia[0] = heavy.inertia[1] = heavy.inertia[2] = 5;
+  World leaning(settings());
+  CHECK(bs_multibody_add(leaning.handle, &heavy, nullptr, 0, low, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_ground_add(leaning.handle, ground, 0, 1, 0, 0.01, &floor, nullptr, 0) == BS_OK);
+  for (int step = 0; step < 500; ++step) CHECK(bs_world_step(leaning.handle, STEP, nullptr, 0) == BS_OK);
+  int32_t count = 0;
+  std::vector<bs_contact> contacts(4);
+  CHECK(bs_contacts(leaning.handle, contacts.data(), 4, &count) == BS_OK && count == 4);
+  double left = 0, right = 0;
+  for (const bs_contact &c : contacts) (c.position_on_b[0] < 0.4 ? left : right) += c.normal_impulse;
+  // Edges at -0.6 and 1.4 from the mass bear 0.7 and 0.3 of it.
+  CHECK(std::abs(left / (3 * 980 * STEP) - 0.7) < 1e-3 && std::abs(right / (3 * 980 * STEP) - 0.3) < 1e-3);
+  World fresh(settings());
+  CHECK(bs_multibody_add(fresh.handle, &heavy, nullptr, 0, low, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_ground_add(fresh.handle, ground, 0, 1, 0, 0.01, &floor, nullptr, 0) == BS_OK);
+  CHECK(restore(fresh, take(leaning)) == BS_OK && same_bits(take(fresh), take(leaning)));
+
+  // Friction that is set acts at once, and is no part of a snapshot.
+  const double low_friction = 0.1;
+  const Numbers still = take(leaning);
+  const double aslant[3] = {300, 0, -980};
+  CHECK(bs_world_set_gravity(leaning.handle, aslant) == BS_OK);
+  for (int step = 0; step < 100; ++step) CHECK(bs_world_step(leaning.handle, STEP, nullptr, 0) == BS_OK);
+  base_of(leaning, body);
+  CHECK(std::abs(state[7]) < 1e-3);
+  CHECK(bs_frictions_set(leaning.handle, body, &low_friction, 1) == BS_OK);
+  for (int step = 0; step < 100; ++step) CHECK(bs_world_step(leaning.handle, STEP, nullptr, 0) == BS_OK);
+  base_of(leaning, body);
+  CHECK(std::abs(state[7] / (0.1 * (300 - 0.1 * 980)) - 1) < 0.01);
+  CHECK(restore(leaning, still) == BS_OK);
+
+  // A bounce of a chain goes off with the product of the two restitutions.
+  bs_link link = box(3, 1, 1, 1, -1);
+  link.parent_com_to_joint[0] = link.joint_to_com[0] = 1;
+  bs_link ball = crate, second = link;
+  ball.restitution = second.restitution = 0.8;
+  World bouncing(settings());
+  const double dropped[3] = {0, 0, 2};
+  CHECK(bs_multibody_add(bouncing.handle, &ball, &second, 1, dropped, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_ground_add(bouncing.handle, ground, 0, 1, 0.5, 0.01, &floor, nullptr, 0) == BS_OK);
+  double fastest_down = 0, fastest_up = 0;
+  for (int step = 0; step < 700; ++step) {
+    CHECK(bs_world_step(bouncing.handle, 1e-4, nullptr, 0) == BS_OK);
+    base_of(bouncing, body);
+    fastest_down = std::fmin(fastest_down, state[9]), fastest_up = std::fmax(fastest_up, state[9]);
+  }
+  // Within what gravity adds in a step.
+  CHECK(std::abs(fastest_up + 0.4 * fastest_down) < 980e-4 && fastest_down < -44);
+
+  // A tie that gives turns by its compliance times the moment: of two boxes of 3 that reach from the pivot to 4.
+  World hanging(settings());
+  const double pivot[3] = {-1, 0, 0};
+  CHECK(bs_multibody_add(hanging.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(hanging.handle, body, pivot, 1e-7, 1e6, nullptr, 0) == BS_OK);
+  double angle = 0, rate = 0, torque = 0;
+  for (int step = 0; step < 4000; ++step) {
+    CHECK(bs_joint_states(hanging.handle, body, &angle, &rate, 1) == BS_OK);
+    torque = -1e6 * (angle + 5e-3 * rate);
+    CHECK(bs_joint_torques_set(hanging.handle, body, &torque, 1) == BS_OK);
+    CHECK(bs_world_step(hanging.handle, 1e-4, nullptr, 0) == BS_OK);
+  }
+  base_of(hanging, body);
+  // A turn about y by phi is a quaternion with sin(phi/2); the moment is 6 * 980 * 2, less by the cosine of small angles.
+  CHECK(std::abs(2 * std::asin(state[4]) / (1e-7 * 6 * 980 * 2) - 1) < 1e-3);
+  CHECK(std::abs(state[0] - (std::cos(2 * std::asin(state[4])) - 1)) < 1e-5);
+  const Numbers hung = take(hanging);
+  World stiffer(settings());
+  CHECK(bs_multibody_add(stiffer.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(stiffer.handle, body, pivot, 2e-7, 1e6, nullptr, 0) == BS_OK);
+  CHECK(restore(stiffer, hung) == BS_ERROR_SNAPSHOT);
 }
 
 // A driven world in mid-jump, with some contacts left.
@@ -449,6 +572,7 @@ int main() {
   identity();
   misuse();
   reading_and_writing();
+  beyond_plain_boxes();
   continuation(true, 500, 3000);
   continuation(false, 500, 1500);
   continuation(true, 1e6, 1500);  // so wide that Bullet stops updating its box and moves it to the tree of fixed objects

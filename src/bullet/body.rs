@@ -1,22 +1,29 @@
 //! What a world is built of, and what is read back from it.
 
-/// One rigid box of a multibody: its mass is spread evenly, so its centre of mass is the centre of the box.
+/// One rigid body of a multibody, with a box to touch things with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoxLink {
     /// Index of the parent link; `None` hangs the link on the base. Ignored for the base.
     pub parent: Option<usize>,
-    /// Mass (g). The inertia is Bullet's own for a box of these extents.
+    /// Mass (g).
     pub mass: f64,
+    /// Moments of inertia about the centre of mass, along the box's axes (g·cm²); `None` is Bullet's own for a box of these extents whose
+    /// mass is spread evenly.
+    pub inertia: Option<[f64; 3]>,
     /// Half the box's edges along x, y, z (cm).
     pub half_extents: [f64; 3],
+    /// From the centre of mass to the box's centre (cm), in this body's frame.
+    pub com_to_box: [f64; 3],
     /// From the parent's centre of mass to the hinge (cm), in the parent's frame. Ignored for the base.
     pub parent_com_to_joint: [f64; 3],
-    /// From the hinge to this box's centre (cm), in this link's frame. Ignored for the base.
+    /// From the hinge to this body's centre of mass (cm), in this link's frame. Ignored for the base.
     pub joint_to_com: [f64; 3],
     /// Unit vector along the hinge, in this link's frame. Ignored for the base.
     pub axis: [f64; 3],
     /// Lateral friction coefficient (–). Bullet multiplies the two of a contact and limits the product to 10.
     pub friction: f64,
+    /// Coefficient of restitution (–), from 0 to 1. A contact has the product of its two.
+    pub restitution: f64,
     /// Collision margin (cm): rounds the box's edges.
     pub collision_margin: f64,
 }
@@ -30,8 +37,20 @@ pub struct Ground {
     pub top: f64,
     /// Lateral friction coefficient (–).
     pub friction: f64,
+    /// Coefficient of restitution (–), from 0 to 1.
+    pub restitution: f64,
     /// Collision margin (cm).
     pub collision_margin: f64,
+}
+
+/// What acts on a body from outside, in the world's axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(C)]
+pub struct Wrench {
+    /// Force on the centre of mass (dyn).
+    pub force: [f64; 3],
+    /// Torque (dyn·cm).
+    pub torque: [f64; 3],
 }
 
 /// A multibody in one particular world.

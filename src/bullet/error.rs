@@ -20,7 +20,7 @@ pub enum BulletError {
     #[error("the body id belongs to another world")]
     ForeignBody,
     /// An array whose length does not fit the body.
-    #[error("{what} has {found} values, but the body has {needed} joints")]
+    #[error("{what} has {found} values, but this body takes {needed}")]
     Length {
         /// The array.
         what: &'static str,

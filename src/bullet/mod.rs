@@ -13,8 +13,8 @@
 //! use sfers::bullet::{BoxLink, SolverSettings, World};
 //! let mut world = World::new(&SolverSettings::pybullet(980.0))?;
 //! let cube = BoxLink {
-//!     parent: None, mass: 1.0, half_extents: [0.5; 3], parent_com_to_joint: [0.0; 3], joint_to_com: [0.0; 3],
-//!     axis: [0.0, 1.0, 0.0], friction: 0.5, collision_margin: 0.001,
+//!     parent: None, mass: 1.0, inertia: None, half_extents: [0.5; 3], com_to_box: [0.0; 3], parent_com_to_joint: [0.0; 3],
+//!     joint_to_com: [0.0; 3], axis: [0.0, 1.0, 0.0], friction: 0.5, restitution: 0.0, collision_margin: 0.001,
 //! };
 //! let body = world.add_multibody(&cube, &[], [0.0, 0.0, 10.0])?;
 //! for _ in 0..10 {
@@ -32,7 +32,7 @@ mod library;
 mod settings;
 mod world;
 
-pub use body::{BaseState, BodyId, BoxLink, Contact, Ground, LinkState, VelocityClamp};
+pub use body::{BaseState, BodyId, BoxLink, Contact, Ground, LinkState, VelocityClamp, Wrench};
 pub use error::BulletError;
 pub use settings::SolverSettings;
 pub use world::{Snapshot, World};

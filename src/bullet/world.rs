@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use bullet_sys as sys;
 
-use super::body::{BaseState, BodyId, BoxLink, Contact, Ground, LinkState, VelocityClamp};
+use super::body::{BaseState, BodyId, BoxLink, Contact, Ground, LinkState, VelocityClamp, Wrench};
 use super::{BulletError, SolverSettings, library};
 
 static NEXT_WORLD: AtomicU64 = AtomicU64::new(1);
@@ -107,6 +107,10 @@ fn not_negative(what: &'static str, value: f64) -> Result<(), BulletError> {
     }
 }
 
+fn share(what: &'static str, value: f64) -> Result<(), BulletError> {
+    if (0.0..=1.0).contains(&value) { Ok(()) } else { Err(BulletError::Value { what, value, needed: "from 0 to 1" }) }
+}
+
 fn index(value: usize) -> Result<i32, BulletError> {
     i32::try_from(value).map_err(|_| BulletError::Refused("more than 2^31 elements".into()))
 }
@@ -116,16 +120,22 @@ fn raw_link(link: &BoxLink) -> Result<sys::bs_link, BulletError> {
     positive("a half extent (cm)", &link.half_extents)?;
     positive("a collision margin (cm)", &[link.collision_margin])?;
     not_negative("a friction coefficient", link.friction)?;
+    share("a coefficient of restitution", link.restitution)?;
+    positive("a moment of inertia (g·cm²)", link.inertia.as_ref().map_or(&[], |inertia| &inertia[..]))?;
+    finite("an offset of a box (cm)", &link.com_to_box)?;
     finite("a joint offset (cm)", &link.parent_com_to_joint)?;
     finite("a joint offset (cm)", &link.joint_to_com)?;
     finite("a hinge axis", &link.axis)?;
     Ok(sys::bs_link {
         mass: link.mass,
+        inertia: link.inertia.unwrap_or_default(),
         half_extents: link.half_extents,
+        com_to_box: link.com_to_box,
         parent_com_to_joint: link.parent_com_to_joint,
         joint_to_com: link.joint_to_com,
         axis: link.axis,
         friction: link.friction,
+        restitution: link.restitution,
         collision_margin: link.collision_margin,
         parent: link.parent.map_or(Ok(-1), index)?,
         reserved: 0,
@@ -219,6 +229,7 @@ impl World {
         positive("a half extent (cm)", &ground.half_extents)?;
         positive("a collision margin (cm)", &[ground.collision_margin])?;
         not_negative("a friction coefficient", ground.friction)?;
+        share("a coefficient of restitution", ground.restitution)?;
         finite("the height of the ground (cm)", &[ground.top])?;
         let mut body = -1;
         let mut message = Message::new();
@@ -229,6 +240,7 @@ impl World {
                 ground.half_extents.as_ptr(),
                 ground.top,
                 ground.friction,
+                ground.restitution,
                 ground.collision_margin,
                 &mut body,
                 message.0.as_mut_ptr(),
@@ -254,6 +266,39 @@ impl World {
         let mut message = Message::new();
         // SAFETY: the body's index is valid in this world (links_of); the message's length is its own.
         let code = unsafe { sys::bs_fixed_constraint_add(self.pointer(), body.index, max_impulse, message.0.as_mut_ptr(), 256) };
+        self.checked(code, &message)
+    }
+
+    /// The same with a tie that gives: the base may turn about its y axis, at `pivot` (cm, in its frame), by `compliance` (rad/(dyn·cm))
+    /// times the moment on it. The spring is implicit, so that no compliance is too small for a step.
+    ///
+    /// # Errors
+    /// [`BulletError::ForeignBody`], [`BulletError::Value`] for a compliance or an impulse that is not positive, or
+    /// [`BulletError::Refused`] for a body that is no chain of links.
+    pub fn add_sprung_constraint(
+        &mut self,
+        body: BodyId,
+        pivot: [f64; 3],
+        compliance: f64,
+        max_impulse: f64,
+    ) -> Result<(), BulletError> {
+        self.links_of(body)?;
+        finite("a pivot (cm)", &pivot)?;
+        positive("a compliance (rad/(dyn·cm))", &[compliance])?;
+        positive("the largest impulse (dyn·s)", &[max_impulse])?;
+        let mut message = Message::new();
+        // SAFETY: the body's index is valid in this world (links_of); pivot has the 3 values asked for; the message's length is its own.
+        let code = unsafe {
+            sys::bs_sprung_constraint_add(
+                self.pointer(),
+                body.index,
+                pivot.as_ptr(),
+                compliance,
+                max_impulse,
+                message.0.as_mut_ptr(),
+                256,
+            )
+        };
         self.checked(code, &message)
     }
 
@@ -323,6 +368,36 @@ impl World {
         let length = self.lengths(body, &[("torques", torques.len())])?;
         // SAFETY: the slice holds `length` values, the number of joints of this body.
         let code = unsafe { sys::bs_joint_torques_set(self.pointer(), body.index, torques.as_ptr(), length) };
+        self.checked(code, &Message::new())
+    }
+
+    /// Adds forces for the coming step, one entry for the base and then one per link.
+    ///
+    /// # Errors
+    /// [`BulletError::Length`] unless there is one entry per body, [`BulletError::Value`] for values that are not finite.
+    pub fn add_forces(&mut self, body: BodyId, forces: &[Wrench]) -> Result<(), BulletError> {
+        self.one_per_body(body, "forces", forces.len())?;
+        for Wrench { force, torque } in forces {
+            finite("a force (dyn)", force)?;
+            finite("a torque (dyn·cm)", torque)?;
+        }
+        let length = index(6 * forces.len())?;
+        // SAFETY: a Wrench is 6 doubles in C's order, and the slice holds one per body of this multibody.
+        let code = unsafe { sys::bs_forces_add(self.pointer(), body.index, forces.as_ptr().cast(), length) };
+        self.checked(code, &Message::new())
+    }
+
+    /// Sets the lateral friction coefficients (–) of all boxes, the base's first, and of the contact points that they have. Like the
+    /// solver's settings they are not part of a snapshot.
+    ///
+    /// # Errors
+    /// [`BulletError::Length`] unless there is one value per body, [`BulletError::Value`] for values that are negative or not finite.
+    pub fn set_frictions(&mut self, body: BodyId, frictions: &[f64]) -> Result<(), BulletError> {
+        self.one_per_body(body, "frictions", frictions.len())?;
+        frictions.iter().try_for_each(|&friction| not_negative("a friction coefficient", friction))?;
+        let length = index(frictions.len())?;
+        // SAFETY: the slice holds `length` values, one per body of this multibody.
+        let code = unsafe { sys::bs_frictions_set(self.pointer(), body.index, frictions.as_ptr(), length) };
         self.checked(code, &Message::new())
     }
 
@@ -474,6 +549,11 @@ impl World {
             return Err(BulletError::ForeignBody);
         }
         Ok(self.link_counts[body.index.unsigned_abs() as usize])
+    }
+
+    fn one_per_body(&self, body: BodyId, what: &'static str, found: usize) -> Result<(), BulletError> {
+        let needed = self.links_of(body)? + 1;
+        if found == needed { Ok(()) } else { Err(BulletError::Length { what, found, needed }) }
     }
 
     fn lengths(&self, body: BodyId, arrays: &[(&'static str, usize)]) -> Result<i32, BulletError> {

@@ -130,7 +130,7 @@ impl From<ConfigError> for Failure {
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Self {
         match error {
-            EngineError::Model(_) | EngineError::Unsupported { .. } => Self::Usage(error.to_string()),
+            EngineError::Model(_) => Self::Usage(error.to_string()),
             _ => Self::Simulation(error.to_string()),
         }
     }

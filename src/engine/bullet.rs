@@ -1,10 +1,30 @@
-//! The reference's robot on Bullet, bit for bit.
+//! The reference's robot on Bullet, bit for bit, and what it may have beyond that.
+//!
+//! # Extensions
+//!
+//! Without them the robot is the reference's, and nothing below is computed. With them:
+//!
+//! - The torque law's own ([`Beyond`]), drag in air ([`Air`]) and friction that depends on speed ([`Sliding`]) act like the torque law: with
+//!   the state that a step begins with, which errs by the first order of the step. None of them keeps anything from step to step that a saved
+//!   state would lack, but the loss ladder, which is saved.
+//! - A mass fixed to the sheet changes mass, centre of mass and inertia of the body it sits on, exactly. Records stay those of the boxes.
+//! - A clamp that gives is a spring at the left end, in the constraint that holds the base. A spring of a stiff clamp would need steps
+//!   far shorter than the joints do, so it is implicit: any compliance goes with any step, and its damping by the step, a damping ratio of
+//!   ω h/2 on the clamp's share of a mode's energy, is of the first order too.
+//! - Restitution is Bullet's, with its threshold of 0.2 cm/s, but that a bounce goes off with the share of the approach speed alone: Bullet's
+//!   own adds the push out of the overlap to it. The approach speed counts what the step's forces add, so that a foot which the actuators
+//!   press down with more than 0.2 cm/s per step trembles; the planar engine takes the speed of the step's beginning.
 
+mod air;
+mod sliding;
+
+use self::air::Air;
+use self::sliding::Sliding;
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
-use crate::bullet::{self, BaseState, BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World};
-use crate::model::{Extensions, LOSS_TIMES, Mount, Robot, StickSlip};
+use crate::bullet::{self, BaseState, BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World, Wrench};
+use crate::model::{Extensions, LOSS_TIMES, Mount, RigidBody, Robot, Segment};
 
 /// Collision margin of every box (cm), as PyBullet sets it for bodies built by its calls.
 const COLLISION_MARGIN: f64 = 0.001;
@@ -31,6 +51,13 @@ pub struct BulletEngine {
     touching: Vec<bullet::Contact>,
     /// What the joints have beyond eq. 1, if anything.
     beyond: Option<Beyond>,
+    air: Option<Air>,
+    sliding: Option<Sliding>,
+    /// How the bodies move and what acts on them, where the two before need it.
+    boxes: Vec<LinkState>,
+    wrenches: Vec<Wrench>,
+    /// From each body's centre of mass to its box's centre, along the body (cm); empty if they are the same.
+    com_to_box: Vec<f64>,
     clamp_hits: Option<ClampHits>,
 }
 
@@ -50,31 +77,30 @@ impl BulletEngine {
     pub fn with_settings(robot: &Robot, time_step: f64, settings: &SolverSettings) -> Result<Self, EngineError> {
         robot.check()?;
         let extensions = &robot.extensions;
-        for (what, asked) in [
-            ("a clamp that gives", extensions.clamp_compliance != 0.0),
-            ("a mass fixed to the sheet", !extensions.point_masses.is_empty()),
-            ("drag in air", extensions.drag != 0.0),
-            ("restitution", extensions.restitution != 0.0),
-            ("friction that depends on speed", extensions.stick_slip != StickSlip::OFF),
-        ] {
-            if asked {
-                return Err(EngineError::Unsupported { engine: "bullet", what });
-            }
-        }
         let mut world = World::new(settings)?;
         if extensions.slope != 0.0 {
             let (sin, cos) = extensions.slope.sin_cos();
             world.set_gravity([-robot.material.gravity * sin, 0.0, -robot.material.gravity * cos])?;
         }
-        let boxes = boxes(robot);
-        let body = world.add_multibody(&boxes[0], &boxes[1..], [0.0; 3])?;
+        let (segments, bodies) = (robot.segments(), robot.rigid_bodies());
+        let sliding = Sliding::new(robot);
+        let boxes = boxes(robot, sliding.as_ref());
+        // The base's box stands at the origin.
+        let com_to_box: Vec<f64> = boxes.iter().map(|link| link.com_to_box[0]).collect();
+        let body = world.add_multibody(&boxes[0], &boxes[1..], [0.0 - com_to_box[0], 0.0, 0.0])?;
         match robot.mount {
+            Mount::Clamped if extensions.clamp_compliance > 0.0 => {
+                let left_end = [-bodies[0].middle * segments[0].length, 0.0, 0.0];
+                world.add_sprung_constraint(body, left_end, extensions.clamp_compliance, CLAMP_IMPULSE)?;
+            }
             Mount::Clamped => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
             Mount::Ground => {
                 world.add_ground(&Ground {
                     half_extents: GROUND_HALF_EXTENTS,
                     top: -0.5 * robot.collision_thickness,
-                    friction: robot.friction.ground,
+                    // Bullet takes products: one that is set every step stands on the robot alone, and so does restitution.
+                    friction: if sliding.is_some() { 1.0 } else { robot.friction.ground },
+                    restitution: 1.0,
                     collision_margin: COLLISION_MARGIN,
                 })?;
             }
@@ -87,7 +113,7 @@ impl BulletEngine {
             body,
             joint: robot.joint(),
             motors_per_actuator: robot.motors_per_actuator,
-            lengths: robot.segments().iter().map(|segment| segment.length).collect(),
+            lengths: segments.iter().map(|segment| segment.length).collect(),
             time_step,
             stable_step: analytic::stable_step(robot),
             step: 0,
@@ -95,6 +121,11 @@ impl BulletEngine {
             links: Vec::with_capacity(joints),
             touching: Vec::new(),
             beyond: Beyond::new(robot),
+            air: Air::new(robot),
+            sliding,
+            boxes: Vec::with_capacity(bodies.len()),
+            wrenches: vec![Wrench::default(); bodies.len()],
+            com_to_box: if com_to_box.iter().any(|&by| by != 0.0) { com_to_box } else { Vec::new() },
             clamp_hits: None,
         })
     }
@@ -102,6 +133,58 @@ impl BulletEngine {
     /// The world and the robot's body in it, for looking at contacts and links.
     pub fn world(&mut self) -> (&mut World, BodyId) {
         (&mut self.world, self.body)
+    }
+
+    /// Pose and velocity of the base's box.
+    fn base_state(&self) -> Result<BaseState, EngineError> {
+        let mut base = self.world.base_state(self.body)?;
+        if let Some(&by) = self.com_to_box.first() {
+            let arm = rotation(&base).map(|row| row[0] * by);
+            add(&mut base.position, arm);
+            add(&mut base.velocity, cross(base.angular_velocity, arm));
+        }
+        Ok(base)
+    }
+
+    /// Reads pose and velocity of the links' boxes.
+    fn read_links(&mut self) -> Result<(), EngineError> {
+        self.world.link_states(self.body, &mut self.links)?;
+        for (link, &by) in self.links.iter_mut().zip(self.com_to_box.iter().skip(1)) {
+            let arm = link.rotation.map(|row| row[0] * by);
+            add(&mut link.position, arm);
+            add(&mut link.velocity, cross(link.angular_velocity, arm));
+        }
+        Ok(())
+    }
+
+    /// Drag, viscous friction and the coefficients of friction of the coming step.
+    fn meet_surroundings(&mut self) -> Result<(), EngineError> {
+        if self.air.is_none() && self.sliding.is_none() {
+            return Ok(());
+        }
+        let base = self.base_state()?;
+        self.read_links()?;
+        self.boxes.clear();
+        self.boxes.push(LinkState {
+            position: base.position,
+            rotation: rotation(&base),
+            velocity: base.velocity,
+            angular_velocity: base.angular_velocity,
+        });
+        self.boxes.extend_from_slice(&self.links);
+        self.wrenches.fill(Wrench::default());
+        if let Some(air) = &self.air {
+            air.push(&self.boxes, &mut self.wrenches);
+        }
+        if let Some(sliding) = &mut self.sliding {
+            sliding.push(&self.boxes, &mut self.wrenches);
+            self.world.set_frictions(self.body, sliding.frictions(&self.boxes))?;
+        }
+        // So far the forces act on the boxes' centres.
+        for ((wrench, body), &by) in self.wrenches.iter_mut().zip(&self.boxes).zip(&self.com_to_box) {
+            add(&mut wrench.torque, cross(body.rotation.map(|row| row[0] * by), wrench.force));
+        }
+        Ok(self.world.add_forces(self.body, &self.wrenches)?)
     }
 
     fn not_finite(&self, what: String, value: f64) -> EngineError {
@@ -173,31 +256,53 @@ impl Beyond {
 }
 
 /// The bodies as boxes whose hinges stand in the faces between them.
-fn boxes(robot: &Robot) -> Vec<BoxLink> {
-    let segments = robot.segments();
-    let half_base = 0.5 * segments[0].length;
-    let boxes = segments.iter().enumerate().map(|(i, segment)| {
-        let half = 0.5 * segment.length;
-        // A link's frame stands in its joint, its centre of mass half its length further; the next joint is a whole length from
-        // the joint, so as far again from the centre of mass.
-        let before = if i == 0 { 0.0 } else { 0.5 * segments[i - 1].length };
-        let to_joint = match i {
-            0 => 0.0,
-            1 => half_base,
-            _ => segments[i - 1].length - before,
-        };
+fn boxes(robot: &Robot, sliding: Option<&Sliding>) -> Vec<BoxLink> {
+    let (segments, bodies) = (robot.segments(), robot.rigid_bodies());
+    let Robot { material, collision_thickness: thickness, extensions, .. } = robot;
+    let left_to_com = |i: usize| bodies[i].middle * segments[i].length;
+    let boxes = segments.iter().zip(&bodies).enumerate().map(|(i, (segment, body))| {
+        // A link's frame stands in its joint, which is its left end and the right end of the link before.
         BoxLink {
             parent: i.checked_sub(2),
-            mass: segment.mass,
-            half_extents: [half, 0.5 * robot.material.width, 0.5 * robot.collision_thickness],
-            parent_com_to_joint: [to_joint, 0.0, 0.0],
-            joint_to_com: [if i == 0 { 0.0 } else { half }, 0.0, 0.0],
+            mass: body.mass,
+            inertia: inertia(segment, body, material.width, *thickness),
+            half_extents: [0.5 * segment.length, 0.5 * material.width, 0.5 * thickness],
+            com_to_box: [0.5 * segment.length - left_to_com(i), 0.0, 0.0],
+            parent_com_to_joint: [if i == 0 { 0.0 } else { segments[i - 1].length - left_to_com(i - 1) }, 0.0, 0.0],
+            joint_to_com: [if i == 0 { 0.0 } else { left_to_com(i) }, 0.0, 0.0],
             axis: [0.0, 1.0, 0.0],
-            friction: segment.friction,
+            friction: sliding.map_or(segment.friction, |sliding| sliding.plain(i)),
+            restitution: extensions.restitution,
             collision_margin: COLLISION_MARGIN,
         }
     });
     boxes.collect()
+}
+
+/// Moments of inertia of a body that has more than its box; none of a plain one, which has Bullet's own.
+fn inertia(segment: &Segment, body: &RigidBody, width: f64, thickness: f64) -> Option<[f64; 3]> {
+    let of_box = |a: f64, b: f64| segment.mass / 12.0 * (a.powi(2) + b.powi(2));
+    // The masses stand on the x axis of the box.
+    let added = body.inertia - of_box(segment.length, thickness);
+    (body.mass != segment.mass).then(|| [of_box(width, thickness), body.inertia, of_box(segment.length, width) + added])
+}
+
+fn add(to: &mut [f64; 3], by: [f64; 3]) {
+    to.iter_mut().zip(by).for_each(|(to, by)| *to += by);
+}
+
+fn cross([ax, ay, az]: [f64; 3], [bx, by, bz]: [f64; 3]) -> [f64; 3] {
+    [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
+}
+
+/// Rotation of the base to the world, by rows.
+fn rotation(base: &BaseState) -> [[f64; 3]; 3] {
+    let [x, y, z, w] = base.orientation;
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
 }
 
 /// Pitch about +y of a body whose x axis points along (x, y, z) in the world (rad): positive lowers the far end.
@@ -245,11 +350,11 @@ impl Engine for BulletEngine {
     /// that Bullet cached one step earlier. Velocities pair the joints' places with the velocities of the links' centres of mass,
     /// and the right end's takes a whole length of the last body as lever from there. All of this is how the reference records.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
-        let base = self.world.base_state(self.body)?;
+        let base = self.base_state()?;
         if let Some(&value) = base.position.iter().chain(&base.velocity).find(|v| !v.is_finite()) {
             return Err(self.not_finite("the base's position or velocity".into(), value));
         }
-        self.world.link_states(self.body, &mut self.links)?;
+        self.read_links()?;
         let p = base_pitch(&base);
         let lever = 0.5 * self.lengths[0];
         let rate = base.angular_velocity[1];
@@ -286,7 +391,7 @@ impl Engine for BulletEngine {
     }
 
     fn base(&mut self) -> Result<PlanarBase, EngineError> {
-        let base = self.world.base_state(self.body)?;
+        let base = self.base_state()?;
         let plane = |v: [f64; 3]| [v[0], v[2]];
         Ok(PlanarBase {
             position: plane(base.position),
@@ -317,6 +422,7 @@ impl Engine for BulletEngine {
     }
 
     fn advance(&mut self) -> Result<(), EngineError> {
+        self.meet_surroundings()?;
         self.world.set_joint_torques(self.body, &self.state.torques)?;
         self.world.step(self.time_step)?;
         if let Some(beyond) = &mut self.beyond {

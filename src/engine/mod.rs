@@ -55,14 +55,6 @@ pub enum EngineError {
         /// Why.
         reason: String,
     },
-    /// An effect that this engine does not know how to step.
-    #[error("{engine} does not know {what}; try the other engine")]
-    Unsupported {
-        /// The engine.
-        engine: &'static str,
-        /// What of the robot.
-        what: &'static str,
-    },
     /// A saved state that is not one of this robot.
     #[error("the state does not fit this robot")]
     State,

@@ -46,14 +46,14 @@ pub struct PointMass {
     pub position: f64,
 }
 
-/// Friction that falls from its static to its sliding value: `μ (1 + (ratio − 1) exp(−(v/speed)²))`, and a viscous part.
+/// Friction that falls from its static to its sliding value: `μ (1 + (ratio − 1) exp(−(v/speed)²))`, and a viscous force beside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StickSlip {
     /// Static over sliding friction (–).
     pub ratio: f64,
     /// Speed at which the difference has fallen to 1/e (cm/s).
     pub speed: f64,
-    /// Force per sliding speed and link in contact (dyn·s/cm).
+    /// Force per sliding speed and link on the floor (dyn·s/cm).
     pub viscous: f64,
 }
 
@@ -61,11 +61,9 @@ impl StickSlip {
     /// No dependence on speed.
     pub const OFF: Self = Self { ratio: 1.0, speed: 1.0, viscous: 0.0 };
 
-    /// The coefficient of friction at the sliding speed `v` (cm/s) under the normal force `normal` (dyn), from the plain one.
-    pub fn friction(&self, plain: f64, v: f64, normal: f64) -> f64 {
-        let v = v.abs();
-        let dry = plain * (1.0 + (self.ratio - 1.0) * (-(v / self.speed).powi(2)).exp());
-        if normal > 0.0 { dry + self.viscous * v / normal } else { dry }
+    /// The coefficient of dry friction at the sliding speed `v` (cm/s), from the plain one.
+    pub fn friction(&self, plain: f64, v: f64) -> f64 {
+        plain * (1.0 + (self.ratio - 1.0) * (-(v / self.speed).powi(2)).exp())
     }
 }
 
@@ -98,6 +96,9 @@ pub const DRY_FRICTION_RATE: f64 = 0.03;
 pub const LEAST_STIFFNESS: f64 = 0.5;
 /// Time constants (s) of the loss ladder: a loss factor of about 0.68 ξ that is flat from 0.3 to 500 Hz.
 pub const LOSS_TIMES: [f64; 5] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
+/// Links whose lowest edge is below this height (cm) are on the floor as far as viscous friction goes: Bullet's reach of contacts. The force
+/// on a link cannot tell, for a flat robot's weight may rest on some links alone.
+pub const VISCOUS_REACH: f64 = 0.02;
 /// Density of air (g/cm³).
 pub const AIR_DENSITY: f64 = 1.2e-3;
 

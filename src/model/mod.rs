@@ -16,9 +16,11 @@ mod laminate;
 mod robot;
 pub mod units;
 
-pub use extensions::{AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, StickSlip};
+pub use extensions::{
+    AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, StickSlip, VISCOUS_REACH,
+};
 pub use laminate::{Laminate, Material};
-pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, Robot, Segment};
+pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment};
 
 use thiserror::Error;
 

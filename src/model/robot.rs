@@ -1,6 +1,6 @@
 //! From a laminate to a chain of motor-link units.
 
-use super::{Extensions, Laminate, Material, ModelError};
+use super::{Extensions, Laminate, Material, ModelError, PointMass};
 use crate::actuator::PiezoJoint;
 
 /// How the robot is held.
@@ -103,6 +103,17 @@ pub struct Segment {
     pub friction: f64,
 }
 
+/// A segment with the masses fixed to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidBody {
+    /// Mass (g).
+    pub mass: f64,
+    /// About y through the centre of mass (g·cm²).
+    pub inertia: f64,
+    /// Where the centre of mass lies between the left end (0) and the right end (1).
+    pub middle: f64,
+}
+
 /// Largest number of joints that an experiment may ask for.
 pub const MAX_JOINTS: usize = 10_000;
 
@@ -168,6 +179,31 @@ impl Robot {
                 }
             })
             .collect()
+    }
+
+    /// The segments as boxes whose mass is spread evenly, with the point masses fixed to them.
+    pub fn rigid_bodies(&self) -> Vec<RigidBody> {
+        let segments = self.segments();
+        let mut left = 0.0;
+        let mut bodies = Vec::with_capacity(segments.len());
+        for (i, segment) in segments.iter().enumerate() {
+            let length = segment.length;
+            let last = i + 1 == segments.len();
+            let inertia = segment.mass / 12.0 * (length.powi(2) + self.collision_thickness.powi(2));
+            let mut body = RigidBody { mass: segment.mass, inertia, middle: 0.5 };
+            let here = |point: &&PointMass| point.position >= left && (point.position < left + length || last);
+            for point in self.extensions.point_masses.iter().filter(here) {
+                let at = ((point.position - left) / length).min(1.0);
+                let apart = (at - body.middle) * length;
+                let sum = body.mass + point.mass;
+                body.inertia += body.mass * point.mass / sum * apart * apart;
+                body.middle += point.mass / sum * (at - body.middle);
+                body.mass = sum;
+            }
+            bodies.push(body);
+            left += length;
+        }
+        bodies
     }
 
     /// Number of bodies that one film covers: `ceil(m·fraction + 0.5)`, as the reference counts.

@@ -37,7 +37,7 @@ pub const STICK_SLIP: Effect = Effect {
             bounds: [0.0, 50.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "viscous force F_v per speed and link in contact",
+            about: "viscous force F_v per speed and link on the floor",
         },
     ],
     action: Action::Robot(|p, robot| robot.extensions.stick_slip = StickSlip { ratio: p[0], speed: 0.1 * p[1], viscous: p[2] }),

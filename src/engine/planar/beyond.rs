@@ -17,7 +17,8 @@ const FRICTION_ENOUGH: f64 = 1e-3;
 const FAST: f64 = 3.0;
 pub(super) const LARGEST_REPETITIONS: u32 = 200;
 /// Points of Gauss along a body, from −1 to 1, with their weights: exact for the square of a linear speed of one sign.
-const GAUSS: [(f64, f64); 3] = [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+pub(in crate::engine) const GAUSS: [(f64, f64); 3] =
+    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
 /// One robot's extra torques, with their memory.
 #[derive(Debug, Clone)]

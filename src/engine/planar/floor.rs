@@ -5,7 +5,7 @@ use wide::f64x2;
 use super::LARGEST_FRICTION;
 use super::contact::{Corner, Grip, Law};
 use super::recursion::{Articulated, Rung, Spatial};
-use crate::model::{Extensions, StickSlip};
+use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
 /// The corners of all bodies. Those that may touch in the step at hand are listed.
 #[derive(Debug, Default)]
@@ -36,9 +36,9 @@ impl Surface {
         (restitution != 0.0 || stick_slip != StickSlip::OFF).then_some(Self { restitution, stick_slip })
     }
 
-    /// Friction at the sliding speed and normal force that the step begins with.
-    fn grip(&self, plain: Grip, speed: f64, normal: f64) -> Grip {
-        Grip::new(self.stick_slip.friction(plain.friction(), speed, normal).min(LARGEST_FRICTION))
+    /// Friction at the sliding speed that the step begins with.
+    fn grip(&self, plain: Grip, speed: f64) -> Grip {
+        Grip::new(self.stick_slip.friction(plain.friction(), speed).min(LARGEST_FRICTION))
     }
 }
 
@@ -93,7 +93,7 @@ impl Floor {
                         let corner = &mut self.corners[k][slot];
                         let (gap, mut grip) = (gap[lane], self.grips[k][lane]);
                         if let Some(surface) = &self.surface {
-                            grip = surface.grip(grip, before[0], corner.impulse(law)[1] / law.reach().0);
+                            grip = surface.grip(grip, before[0]);
                         }
                         corner.place([x[lane], z[lane]], gap, before, grip, law);
                         if let Some(surface) = &self.surface {
@@ -114,6 +114,35 @@ impl Floor {
         }
         self.mark();
         !self.near.is_empty()
+    }
+
+    /// Force per sliding speed and link on the floor (dyn·s/cm).
+    fn viscous(&self) -> f64 {
+        self.surface.map_or(0.0, |surface| surface.stick_slip.viscous)
+    }
+
+    pub(super) fn is_viscous(&self) -> bool {
+        self.viscous() != 0.0
+    }
+
+    /// Adds viscous friction over the time `share` (s) to the momentum of the bodies on the floor, with the root's reference point as in
+    /// [`find`](Self::find). A force of its own and not a part of the coefficient: which corner bears the weight of a flat robot changes
+    /// from step to step, and with it what a coefficient would have to be.
+    pub(super) fn push_viscous(&self, rungs: &mut [Rung], height: f64, share: f64) {
+        let push = f64x2::splat(-share * self.viscous());
+        let half = f64x2::splat(self.half_thickness);
+        let mut at = f64x2::splat(height + self.half_thickness);
+        for (k, rung) in rungs.iter_mut().enumerate() {
+            let across = rung.across[1];
+            // The lowest edge, from the reference point.
+            let edge = across.fast_min(f64x2::ZERO) - half * rung.along[0].abs();
+            let speed = rung.motion[1] - rung.motion[0] * (edge - rung.middle * across);
+            let near = (at + edge).simd_lt(f64x2::splat(VISCOUS_REACH)) & rung.mass.simd_gt(f64x2::ZERO);
+            let impulse = near.select(push * speed, f64x2::ZERO);
+            rung.momentum[0] -= edge * impulse;
+            rung.momentum[1] += impulse;
+            at = next(at, across, k);
+        }
     }
 
     /// Notes which rungs have corners that are not open.

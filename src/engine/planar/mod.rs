@@ -46,6 +46,7 @@ mod statics;
 
 use wide::f64x2;
 
+pub(super) use self::beyond::GAUSS;
 use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
 use self::floor::{Floor, Surface, next};
@@ -53,10 +54,10 @@ use self::recursion::{Hold, Rung, Spatials, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
-use crate::model::{Mount, PointMass, Robot, Segment};
+use crate::model::{Mount, Robot};
 
 /// Bullet's limit on the product of two friction coefficients, kept for equal friction.
-const LARGEST_FRICTION: f64 = 10.0;
+pub(super) const LARGEST_FRICTION: f64 = 10.0;
 /// The weight of a step's end over that of its start is 1/2 + this (1/s) times the step, so that what alternates from step to step dies out:
 /// a velocity that springs and dampers dictate keeps −(1 − w)/w of an alternation per step. For a mode of angular frequency ω this adds
 /// h (w − 1/2) ω/2 to the damping ratio, of second order in h.
@@ -141,7 +142,7 @@ impl PlanarEngine {
         let joint = robot.joint();
         let thickness = robot.collision_thickness;
         let extensions = &robot.extensions;
-        let bodies = Body::of(&segments, thickness, &extensions.point_masses);
+        let bodies = robot.rigid_bodies();
         let mass: f64 = bodies.iter().map(|body| body.mass).sum();
         let weight = (0.5 + damping * time_step).min(1.0);
         let implicit = weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step);
@@ -371,38 +372,6 @@ impl PlanarEngine {
     }
 }
 
-/// Mass (g), inertia about the centre of mass (g·cm²), and where that lies between left end (0) and right end (1).
-struct Body {
-    mass: f64,
-    inertia: f64,
-    middle: f64,
-}
-
-impl Body {
-    /// The boxes with the masses fixed to them.
-    fn of(segments: &[Segment], thickness: f64, masses: &[PointMass]) -> Vec<Self> {
-        let mut left = 0.0;
-        let mut bodies = Vec::with_capacity(segments.len());
-        for (i, segment) in segments.iter().enumerate() {
-            let length = segment.length;
-            let last = i + 1 == segments.len();
-            let inertia = segment.mass / 12.0 * (length.powi(2) + thickness.powi(2));
-            let mut body = Self { mass: segment.mass, inertia, middle: 0.5 };
-            for point in masses.iter().filter(|point| point.position >= left && (point.position < left + length || last)) {
-                let at = ((point.position - left) / length).min(1.0);
-                let apart = (at - body.middle) * length;
-                let sum = body.mass + point.mass;
-                body.inertia += body.mass * point.mass / sum * apart * apart;
-                body.middle += point.mass / sum * (at - body.middle);
-                body.mass = sum;
-            }
-            bodies.push(body);
-            left += length;
-        }
-        bodies
-    }
-}
-
 /// Gravity along x and z (cm/s²) of a floor that rises by `slope` (rad) along +x, in its axes.
 fn pull(gravity: f64, slope: f64) -> [f64; 2] {
     if slope == 0.0 { [0.0, -gravity] } else { [-gravity * slope.sin(), -gravity * slope.cos()] }
@@ -562,6 +531,10 @@ impl Engine for PlanarEngine {
                 (0..3).for_each(|k| momentum[k] += f64x2::splat(share) * drag[k]);
             }
             rung.load(momentum);
+        }
+        if let Some(floor) = self.floor.as_ref().filter(|floor| floor.is_viscous()) {
+            let height = self.root_position(0.5 * h)[1];
+            floor.push_viscous(&mut self.rungs, height, share);
         }
         self.solve_step(share)?;
         let (step, per_weight) = (f64x2::splat(h), f64x2::splat(1.0 / self.weight));
