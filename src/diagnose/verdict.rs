@@ -13,9 +13,10 @@ use super::tests::{ResidualTest, residual_tests};
 const SEARCH_RESOLUTION: f64 = 10.0;
 /// Structure is left if χ² per value is above 1 by so much (a misfit of half the noise), ...
 const LEFT_OVER: f64 = 0.25;
-/// ... and by so much of what the refined nominal model leaves. With three or more causes it takes less, by the square of one less than their
-/// number: a handful of causes that still leave something are the shadow of one that is not in the library.
-const LEFT_SHARE: f64 = 0.05;
+/// ... and by so much of what the refined nominal model leaves: true causes in other equations than the library's left 0.6 % at most. With three or
+/// more causes it takes less, in inverse proportion to one less than their number: a handful of causes that still leave something are the shadow
+/// of one that is not in the library.
+const LEFT_SHARE: f64 = 0.02;
 /// Above this share nothing is named at all.
 const NOTHING_NAMED: f64 = 0.5;
 /// Replacements are looked at again, at the full precision, if their χ² is above the best one's by no more than this.
@@ -261,8 +262,8 @@ pub fn diagnose(
     let above = |scored: &Scored| (scored.total() / count - 1.0).max(0.0);
     let (left, whole) = (above(&best), above(&bare));
     let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
-    let causes = best.model().terms.len().max(2) as f64 - 1.0;
-    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / (causes * causes);
+    let handful = best.model().terms.len().max(2) as f64 - 1.0;
+    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / handful;
     let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
     if unnamed && !best.model().terms.is_empty() {
         let names: Vec<_> = best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
