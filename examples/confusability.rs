@@ -1,22 +1,49 @@
-//! Hides effects in data, diagnoses them, and prints what was said of each as Markdown: the matrix of docs/validation.md.
+//! Hides effects in data, diagnoses them, and prints what was said of each as Markdown: the matrices of docs/validation.md.
 //!
 //! ```sh
 //! cargo run --release --example confusability -- [SIZES] [SEEDS] [NOISES_MM] [IDS]     # lists with commas; by default 0,1,2 1 0.05 all
 //! ```
 //!
-//! The data come from tests/hidden, a simulator of its own. Every case is a data set of 11 runs and 37 s of motion.
+//! The data come from tests/hidden: 11 runs and 37 s of motion of a cantilever, or, for ids after `floor:`, 10 runs and 12 s of motion of a robot
+//! on the floor. `floor` stands for all effects that can be hidden there, `a+b` for two at once.
 
 #[path = "../tests/hidden/generator.rs"]
 mod generator;
+#[path = "../tests/hidden/ground.rs"]
+mod ground;
+#[path = "../tests/hidden/judge.rs"]
+mod judge;
+
+use std::path::Path;
 
 use generator::{Case, INSIDE, OUTSIDE};
-use sfers::diagnose::dataset::Dataset;
-use sfers::diagnose::quality;
-use sfers::diagnose::robot::RobotPlant;
-use sfers::diagnose::verdict::diagnose;
+use judge::{diagnosed, holds, physics};
 
 fn numbers<T: std::str::FromStr + Clone>(argument: Option<&String>, default: &[T]) -> Vec<T> {
     argument.map_or(default.to_vec(), |list| list.split(',').filter_map(|item| item.parse().ok()).collect())
+}
+
+/// True parameters of a hidden effect: its name, the parameter's, the value.
+type Truth = (String, &'static str, f64);
+
+/// Writes the data of a case: the trace (mm) of what is hidden in them, and the true values.
+fn hide(folder: &Path, id: &str, size: usize, seed: u64, noise_mm: f64) -> (f64, Vec<Truth>) {
+    if let Some(id) = id.strip_prefix("floor:") {
+        let clean = ground::film(&ground::Floor::default());
+        if id == "none" {
+            ground::write(folder, &clean, noise_mm, seed);
+            return (0.0, Vec::new());
+        }
+        let (floor, parameters) = ground::hide(id, size, seed);
+        let films = ground::film(&floor);
+        ground::write(folder, &films, noise_mm, seed);
+        return (ground::trace(&films, &clean), parameters.into_iter().map(|(name, value)| (id.into(), name, value)).collect());
+    }
+    let effects: Vec<&str> = id.split('+').filter(|id| *id != "none").collect();
+    let case = Case { effects: &effects, size, noise_mm, seed, outliers: false, damaged: false, m: 3 };
+    let truth = generator::write(folder, &case);
+    let all = truth.hidden.iter().flat_map(|hidden| hidden.parameters.iter().map(|(name, value)| (hidden.id.into(), *name, *value)));
+    (truth.trace_mm, all.collect())
 }
 
 fn main() {
@@ -24,33 +51,31 @@ fn main() {
     let sizes = numbers(arguments.get(1), &[0_usize, 1, 2]);
     let seeds = numbers(arguments.get(2), &[1_u64]);
     let noises = numbers(arguments.get(3), &[0.05]);
-    let all: Vec<&str> = ["none"].into_iter().chain(INSIDE.iter().copied()).chain(OUTSIDE.iter().copied()).collect();
-    let ids: Vec<&str> = arguments.get(4).map_or(all, |list| list.split(',').collect());
+    let all = || ["none"].into_iter().chain(INSIDE.iter().copied()).chain(OUTSIDE.iter().copied()).map(String::from).collect();
+    let floor = || ["none"].into_iter().chain(ground::INSIDE.map(|inside| inside.0)).map(|id| format!("floor:{id}")).collect();
+    let ids: Vec<String> = match arguments.get(4).map(String::as_str) {
+        None => all(),
+        Some("floor") => floor(),
+        Some(list) => list.split(',').map(String::from).collect(),
+    };
     println!(
         "| hidden | size, noise (mm) | trace (mm) | verdict | found | true value in its range | held-out error / noise | left |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     let mut cases = Vec::new();
-    for id in ids {
-        for &size in &sizes {
+    for id in &ids {
+        // Nothing has one size.
+        for &size in if id.ends_with("none") { &sizes[..1] } else { &sizes } {
             for &seed in &seeds {
                 cases.extend(noises.iter().map(|noise_mm| (id, size, seed, *noise_mm)));
             }
         }
     }
     for (id, size, seed, noise_mm) in cases {
-        let effects: Vec<&str> = id.split('+').filter(|id| *id != "none").collect();
         let folder = tempfile::tempdir().expect("a folder for the data");
-        let case = Case { effects: &effects, size, noise_mm, seed, outliers: false, damaged: false, m: 3 };
-        let truth = generator::write(folder.path(), &case);
-        let set = Dataset::read(&folder.path().join("dataset.toml")).expect("the generator's own data");
-        let checked = quality::check(&set);
-        let plant = RobotPlant::new(&set, &checked);
-        let roles: Vec<_> = set.runs.iter().map(|run| run.role).collect();
-        let outcome = diagnose(&plant, id, &roles, checked.remarks, &|_| {}, &|_| None).expect("the nominal model runs");
-        let d = outcome.diagnosis;
-        let physics: Vec<_> = d.effects.iter().filter(|effect| effect.id != "discretisation").collect();
-        let found: Vec<String> = physics
+        let (trace_mm, truths) = hide(folder.path(), id, size, seed, noise_mm);
+        let d = diagnosed(folder.path()).diagnosis;
+        let found: Vec<String> = physics(&d)
             .iter()
             .map(|effect| {
                 if effect.tied_with.is_empty() {
@@ -60,22 +85,10 @@ fn main() {
                 }
             })
             .collect();
-        let mut inside = Vec::new();
-        for hidden in &truth.hidden {
-            for (name, value) in &hidden.parameters {
-                let estimate = physics
-                    .iter()
-                    .filter(|effect| effect.id == hidden.id)
-                    .flat_map(|effect| &effect.parameters)
-                    .find(|p| p.name == *name);
-                if let Some([Some(low), Some(high)]) = estimate.map(|estimate| estimate.ci95) {
-                    inside.push(if low <= *value && *value <= high { "yes" } else { "no" });
-                }
-            }
-        }
+        let inside = truths.iter().filter_map(|(id, name, value)| holds(&d, id, name, *value));
+        let inside: Vec<&str> = inside.map(|holds| if holds { "yes" } else { "no" }).collect();
         println!(
-            "| {id} | {size}, {noise_mm} | {:.2} | {:?} | {} | {} | {:.2} | {:.1} % |",
-            truth.trace_mm,
+            "| {id} | {size}, {noise_mm} | {trace_mm:.2} | {:?} | {} | {} | {:.2} | {:.1} % |",
             d.verdict,
             found.join(" + "),
             inside.join(", "),

@@ -300,7 +300,7 @@ fn loss_factor(loss: f64, hertz: f64) -> f64 {
 }
 
 /// Largest distance between the branches of the loop from 0 to -1500 V and back, as a share of the stroke.
-fn loop_width(share: f64) -> f64 {
+pub fn loop_width(share: f64) -> f64 {
     let mut plays = Plays::new(share, 0.0);
     let (mut down, mut up) = (Vec::new(), Vec::new());
     for _ in 0..2 {

@@ -14,7 +14,7 @@ use sfers::engine::{BulletEngine, Engine};
 use sfers::experiment::{self, Source};
 use sfers::model::Robot;
 
-use super::generator::effects::Random;
+use super::generator::effects::{Random, loop_width};
 use super::generator::protocol::Plays;
 
 /// Bullet's step (s): half of what its explicit torque law stands.
@@ -83,6 +83,8 @@ impl Wave {
 #[derive(Clone)]
 pub struct Floor {
     pub friction: f64,
+    pub static_ratio: f64,
+    pub restitution: f64,
     pub slope_deg: f64,
     /// Gain of every actuator.
     pub gains: [f64; ACTUATORS],
@@ -93,8 +95,82 @@ pub struct Floor {
 
 impl Default for Floor {
     fn default() -> Self {
-        Self { friction: 1.0, slope_deg: 0.0, gains: [1.0; ACTUATORS], delay_s: 0.0, hysteresis: 0.0, tilt_deg: 0.0 }
+        Self {
+            friction: 1.0,
+            static_ratio: 1.0,
+            restitution: 0.0,
+            slope_deg: 0.0,
+            gains: [1.0; ACTUATORS],
+            delay_s: 0.0,
+            hysteresis: 0.0,
+            tilt_deg: 0.0,
+        }
     }
+}
+
+/// Effects that can be hidden, with the ranges of a small, a medium and a large value; they may be mirrored at the value that hides nothing.
+pub const INSIDE: [(&str, [(f64, f64); 3], Option<f64>); 9] = [
+    ("ground-friction", [(0.88, 0.83), (0.78, 0.65), (0.6, 0.45)], Some(1.0)),
+    ("stick-slip", [(1.1, 1.15), (1.2, 1.3), (1.35, 1.5)], None),
+    ("contact-restitution", [(0.2, 0.3), (0.35, 0.45), (0.5, 0.6)], None),
+    ("ground-slope", [(0.7, 0.9), (1.2, 1.8), (2.2, 2.9)], Some(0.0)),
+    ("weak-actuator", [(0.98, 0.97), (0.955, 0.93), (0.9, 0.8)], None),
+    ("actuation-gain", [(0.985, 0.98), (0.97, 0.955), (0.94, 0.9)], Some(1.0)),
+    ("time-delay", [(0.004, 0.005), (0.006, 0.01), (0.012, 0.018)], None),
+    ("hysteresis", [(0.1, 0.15), (0.2, 0.3), (0.35, 0.45)], None),
+    ("camera-tilt", [(0.13, 0.2), (0.3, 0.5), (0.7, 1.5)], Some(0.0)),
+];
+
+/// Hides an effect, drawn by the seed, and says its parameters in the units of the library.
+pub fn hide(id: &str, size: usize, seed: u64) -> (Floor, Vec<(&'static str, f64)>) {
+    let (_, ranges, mirror) = INSIDE.into_iter().find(|inside| inside.0 == id).unwrap_or_else(|| panic!("no effect {id}"));
+    let mut random = Random::new(seed, &format!("floor {id} {size}"));
+    let drawn = random.between(ranges[size].0, ranges[size].1);
+    let value = match mirror {
+        Some(off) if random.uniform() < 0.5 => 2.0 * off - drawn,
+        _ => drawn,
+    };
+    let mut floor = Floor::default();
+    let parameters = match id {
+        "ground-friction" => {
+            floor.friction = value;
+            vec![("scale", value)]
+        }
+        "stick-slip" => {
+            floor.static_ratio = value;
+            vec![("static_ratio", value)]
+        }
+        "contact-restitution" => {
+            floor.restitution = value;
+            vec![("restitution", value)]
+        }
+        "ground-slope" => {
+            floor.slope_deg = value;
+            vec![("angle_deg", value)]
+        }
+        "weak-actuator" => {
+            let which = random.below(ACTUATORS);
+            floor.gains[which] = value;
+            vec![("actuator", which as f64 + 1.0), ("gain", value)]
+        }
+        "actuation-gain" => {
+            floor.gains = [value; ACTUATORS];
+            vec![("scale", value)]
+        }
+        "time-delay" => {
+            floor.delay_s = value;
+            vec![("delay_s", value)]
+        }
+        "hysteresis" => {
+            floor.hysteresis = value;
+            vec![("width", loop_width(value))]
+        }
+        _ => {
+            floor.tilt_deg = value;
+            vec![("angle_deg", value)]
+        }
+    };
+    (floor, parameters)
 }
 
 /// Markers of a run without noise: x and z of each in mm, row after row.
@@ -106,6 +182,8 @@ pub fn robot(hidden: &Floor) -> Robot {
     let mut robot = experiment::experiment(&Source::from_text("the bench", &text)).expect("the robot of the bench").robot;
     robot.extensions.slope = hidden.slope_deg.to_radians();
     robot.friction.ground *= hidden.friction;
+    robot.extensions.stick_slip.ratio = hidden.static_ratio;
+    robot.extensions.restitution = hidden.restitution;
     robot
 }
 

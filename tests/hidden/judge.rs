@@ -1,0 +1,59 @@
+//! Diagnoses data in a folder, and says whether the hidden cause was found.
+
+#![allow(dead_code)] // every user takes a part of it
+
+use std::path::Path;
+
+use sfers::diagnose::dataset::Dataset;
+use sfers::diagnose::plant::Model;
+use sfers::diagnose::robot::RobotPlant;
+use sfers::diagnose::verdict::{Adopted, Diagnosis, Outcome, Verdict, diagnose};
+use sfers::diagnose::{protocols, quality};
+
+/// Diagnoses a data set as `sfers diagnose` does.
+pub fn diagnosed(folder: &Path) -> Outcome {
+    let set = Dataset::read(&folder.join("dataset.toml")).expect("the generator's own data");
+    let checked = quality::check(&set);
+    let plant = RobotPlant::new(&set, &checked);
+    let roles: Vec<_> = set.runs.iter().map(|run| run.role).collect();
+    let separate = |models: &[Model]| protocols::separate(&plant, models);
+    diagnose(&plant, "case", &roles, checked.remarks, &|_| {}, &separate).expect("the nominal model runs")
+}
+
+/// Causes that these data cannot tell apart, by effects.md: one name of a line stands for all.
+const INSEPARABLE: [&[&str]; 2] = [&["stiffness", "areal-mass"], &["time-delay", "sensor-delay"]];
+
+/// Adopted causes beside the discretisation.
+pub fn physics(d: &Diagnosis) -> Vec<&Adopted> {
+    d.effects.iter().filter(|effect| effect.id != "discretisation").collect()
+}
+
+/// Their names.
+pub fn names(d: &Diagnosis) -> Vec<&str> {
+    physics(d).iter().map(|effect| effect.id.as_str()).collect()
+}
+
+/// Whether the hidden cause is named, alone, or tied within what cannot be told apart.
+pub fn is_right(d: &Diagnosis, hidden: &str) -> bool {
+    let [effect] = physics(d)[..] else { return false };
+    let set = INSEPARABLE.iter().find(|set| set.contains(&hidden)).copied().unwrap_or_default();
+    let allowed = |id: &str| id == hidden || set.contains(&id);
+    matches!(d.verdict, Verdict::Named | Verdict::Tied)
+        && allowed(&effect.id)
+        && effect.tied_with.iter().all(|id| allowed(id))
+        && (effect.id == hidden || effect.tied_with.iter().any(|id| id == hidden))
+}
+
+/// Whether the range of a parameter of the cause holds the true value; none if it has no such range.
+pub fn holds(d: &Diagnosis, hidden: &str, parameter: &str, value: f64) -> Option<bool> {
+    let of_cause = physics(d).into_iter().filter(|effect| effect.id == hidden);
+    match of_cause.flat_map(|effect| &effect.parameters).find(|p| p.name == parameter)?.ci95 {
+        [Some(low), Some(high)] => Some(low <= value && value <= high),
+        _ => None,
+    }
+}
+
+/// Whether the longer suites run.
+pub fn long() -> bool {
+    std::env::var("SFERS_LONG").is_ok_and(|value| value == "1")
+}

@@ -1,0 +1,58 @@
+//! Effects hidden in data of a robot on the floor, which the Bullet engine makes and the planar engine explains.
+//!
+//! The short suite runs a sample of it, `SFERS_LONG=1` all; `cargo run --release --example confusability -- 0,1,2 5 0.1 floor` prints the matrix of
+//! docs/validation.md.
+
+#[path = "hidden/generator.rs"]
+mod generator;
+#[path = "hidden/ground.rs"]
+mod ground;
+#[path = "hidden/judge.rs"]
+mod judge;
+
+use ground::{Floor, INSIDE, film, hide, trace, write};
+use judge::{diagnosed, holds, is_right, long, names};
+use sfers::diagnose::verdict::{Outcome, Verdict};
+
+const NOISE_MM: f64 = 0.1;
+
+/// Diagnoses what a floor shows, with the rms of what differs from the nominal one.
+fn found(floor: &Floor, seed: u64) -> (f64, Outcome) {
+    let folder = tempfile::tempdir().unwrap();
+    let films = film(floor);
+    write(folder.path(), &films, NOISE_MM, seed);
+    (trace(&films, &film(&Floor::default())), diagnosed(folder.path()))
+}
+
+#[test]
+fn hidden_effects_are_named() {
+    let chosen = if long() { INSIDE.map(|inside| inside.0).to_vec() } else { vec!["ground-friction"] };
+    let (mut wrong, mut counted) = (Vec::new(), 0);
+    for (index, id) in chosen.iter().enumerate() {
+        let (floor, parameters) = hide(id, 1 + index % 2, 11 + index as u64);
+        let (trace, outcome) = found(&floor, 11);
+        let d = &outcome.diagnosis;
+        if trace < 3.0 * NOISE_MM {
+            continue;
+        }
+        counted += 1;
+        if is_right(d, id) {
+            assert!(d.extended.rmse_heldout_mm < 1.2 * NOISE_MM, "{id}: held-out error {} mm", d.extended.rmse_heldout_mm);
+        } else {
+            wrong.push(format!("{id} {parameters:?}, {trace:.2} mm: {:?} {:?}", d.verdict, names(d)));
+        }
+        if *id == "ground-friction" {
+            assert_eq!(holds(d, id, parameters[0].0, parameters[0].1), Some(true), "{parameters:?}: {:?}", d.effects);
+        }
+    }
+    assert!(20 * wrong.len() <= counted && counted > 0, "{wrong:?}");
+}
+
+#[test]
+fn nothing_is_found_where_only_the_engines_differ() {
+    let (_, outcome) = found(&Floor::default(), 1);
+    let d = &outcome.diagnosis;
+    assert_eq!((d.verdict, names(d)), (Verdict::None, vec![]));
+    // Bullet's contact and the planar engine's differ by a fifth of the noise or so.
+    assert!(d.baseline.rmse_mm < 1.1 * NOISE_MM, "{}", d.baseline.rmse_mm);
+}
