@@ -10,18 +10,17 @@ mod ground;
 #[path = "hidden/judge.rs"]
 mod judge;
 
-use ground::{Floor, INSIDE, film, hide, trace, write};
+use ground::{Film, INSIDE, film, hide, nominal, trace, write};
 use judge::{diagnosed, holds, is_right, long, names};
 use sfers::diagnose::verdict::{Outcome, Verdict};
 
 const NOISE_MM: f64 = 0.1;
 
-/// Diagnoses what a floor shows, with the rms of what differs from the nominal one.
-fn found(floor: &Floor, seed: u64) -> (f64, Outcome) {
+/// Diagnoses films with noise.
+fn found(films: &[Film], seed: u64) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
-    let films = film(floor);
-    write(folder.path(), &films, NOISE_MM, seed);
-    (trace(&films, &film(&Floor::default())), diagnosed(folder.path()))
+    write(folder.path(), films, NOISE_MM, seed);
+    diagnosed(folder.path())
 }
 
 #[test]
@@ -30,12 +29,14 @@ fn hidden_effects_are_named() {
     let (mut wrong, mut counted) = (Vec::new(), 0);
     for (index, id) in chosen.iter().enumerate() {
         let (floor, parameters) = hide(id, 1 + index % 2, 11 + index as u64);
-        let (trace, outcome) = found(&floor, 11);
-        let d = &outcome.diagnosis;
+        let films = film(&floor);
+        let trace = trace(&films, nominal());
         if trace < 3.0 * NOISE_MM {
             continue;
         }
         counted += 1;
+        let outcome = found(&films, 11);
+        let d = &outcome.diagnosis;
         if is_right(d, id) {
             assert!(d.extended.rmse_heldout_mm < 1.2 * NOISE_MM, "{id}: held-out error {} mm", d.extended.rmse_heldout_mm);
         } else {
@@ -50,7 +51,7 @@ fn hidden_effects_are_named() {
 
 #[test]
 fn nothing_is_found_where_only_the_engines_differ() {
-    let (_, outcome) = found(&Floor::default(), 1);
+    let outcome = found(nominal(), 1);
     let d = &outcome.diagnosis;
     assert_eq!((d.verdict, names(d)), (Verdict::None, vec![]));
     // Bullet's contact and the planar engine's differ by a fifth of the noise or so.

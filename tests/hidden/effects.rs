@@ -283,7 +283,7 @@ pub fn set(id: &str, value: f64, nature: &mut Nature, random: &mut Random) -> Ve
     vec![(name, value)]
 }
 
-fn put(place: &mut f64, value: f64, name: &'static str) -> &'static str {
+pub fn put(place: &mut f64, value: f64, name: &'static str) -> &'static str {
     *place = value;
     name
 }

@@ -8,13 +8,14 @@
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 use sfers::engine::{BulletEngine, Engine};
 use sfers::experiment::{self, Source};
 use sfers::model::Robot;
 
-use super::generator::effects::{Random, loop_width};
+use super::generator::effects::{Random, loop_width, put};
 use super::generator::protocol::Plays;
 
 /// Bullet's step (s): half of what its explicit torque law stands.
@@ -131,46 +132,28 @@ pub fn hide(id: &str, size: usize, seed: u64) -> (Floor, Vec<(&'static str, f64)
         _ => drawn,
     };
     let mut floor = Floor::default();
-    let parameters = match id {
-        "ground-friction" => {
-            floor.friction = value;
-            vec![("scale", value)]
-        }
-        "stick-slip" => {
-            floor.static_ratio = value;
-            vec![("static_ratio", value)]
-        }
-        "contact-restitution" => {
-            floor.restitution = value;
-            vec![("restitution", value)]
-        }
-        "ground-slope" => {
-            floor.slope_deg = value;
-            vec![("angle_deg", value)]
-        }
+    let name = match id {
+        "ground-friction" => put(&mut floor.friction, value, "scale"),
+        "stick-slip" => put(&mut floor.static_ratio, value, "static_ratio"),
+        "contact-restitution" => put(&mut floor.restitution, value, "restitution"),
+        "ground-slope" => put(&mut floor.slope_deg, value, "angle_deg"),
         "weak-actuator" => {
             let which = random.below(ACTUATORS);
             floor.gains[which] = value;
-            vec![("actuator", which as f64 + 1.0), ("gain", value)]
+            return (floor, vec![("actuator", which as f64 + 1.0), ("gain", value)]);
         }
         "actuation-gain" => {
             floor.gains = [value; ACTUATORS];
-            vec![("scale", value)]
+            "scale"
         }
-        "time-delay" => {
-            floor.delay_s = value;
-            vec![("delay_s", value)]
-        }
+        "time-delay" => put(&mut floor.delay_s, value, "delay_s"),
         "hysteresis" => {
             floor.hysteresis = value;
-            vec![("width", loop_width(value))]
+            return (floor, vec![("width", loop_width(value))]);
         }
-        _ => {
-            floor.tilt_deg = value;
-            vec![("angle_deg", value)]
-        }
+        _ => put(&mut floor.tilt_deg, value, "angle_deg"),
     };
-    (floor, parameters)
+    (floor, vec![(name, value)])
 }
 
 /// Markers of a run without noise: x and z of each in mm, row after row.
@@ -178,13 +161,21 @@ pub type Film = Vec<[f64; 2 * MARKERS.len()]>;
 
 /// The robot as it is on the bench.
 pub fn robot(hidden: &Floor) -> Robot {
-    let text = format!("{ROBOT}\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0, 0]\n\n[simulation]\ntime_step_s = 1e-5\nduration_s = 1\n");
+    let text = format!(
+        "{ROBOT}\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0, 0]\n\n[simulation]\ntime_step_s = 1e-5\nduration_s = 1\n"
+    );
     let mut robot = experiment::experiment(&Source::from_text("the bench", &text)).expect("the robot of the bench").robot;
     robot.extensions.slope = hidden.slope_deg.to_radians();
     robot.friction.ground *= hidden.friction;
     robot.extensions.stick_slip.ratio = hidden.static_ratio;
     robot.extensions.restitution = hidden.restitution;
     robot
+}
+
+/// All runs where nothing is hidden.
+pub fn nominal() -> &'static Vec<Film> {
+    static NOMINAL: OnceLock<Vec<Film>> = OnceLock::new();
+    NOMINAL.get_or_init(|| film(&Floor::default()))
 }
 
 /// All runs without noise.
@@ -203,9 +194,8 @@ fn film_of(hidden: &Floor, wave: &Wave) -> Film {
     for step in 0..=(REST + ROWS - 1) * STEPS_PER_ROW {
         // Bullet applies a torque over the step that follows: the voltage is that of the step's middle.
         let t = (step as f64 + 0.5) * STEP - (REST * STEPS_PER_ROW) as f64 * STEP;
-        let volts: Vec<f64> = (0..ACTUATORS)
-            .map(|k| hidden.gains[k] * plays[k].follow(wave.volts(t - hidden.delay_s, k)))
-            .collect();
+        let volts: Vec<f64> =
+            (0..ACTUATORS).map(|k| hidden.gains[k] * plays[k].follow(wave.volts(t - hidden.delay_s, k))).collect();
         engine.prepare(&volts).expect("a step");
         if step % STEPS_PER_ROW == 0 && step >= REST * STEPS_PER_ROW {
             engine.nodes(&mut nodes, &mut rates).expect("where the nodes are");
