@@ -54,7 +54,7 @@ fn main() {
     let seeds = numbers(arguments.get(2), &[1_u64]);
     let noises = numbers(arguments.get(3), &[0.05]);
     let all = || ["none"].into_iter().chain(INSIDE.iter().copied()).chain(OUTSIDE.iter().copied()).map(String::from).collect();
-    let floor = || ["none"].into_iter().chain(ground::INSIDE.map(|inside| inside.0)).map(|id| format!("floor:{id}")).collect();
+    let floor = || ["none"].into_iter().chain(ground::INSIDE.map(|sizes| sizes.id)).map(|id| format!("floor:{id}")).collect();
     let ids: Vec<String> = match arguments.get(4).map(String::as_str) {
         None => all(),
         Some("floor") => floor(),

@@ -25,7 +25,7 @@ fn found(films: &[Film], seed: u64) -> Outcome {
 
 #[test]
 fn hidden_effects_are_named() {
-    let chosen = if long() { INSIDE.map(|inside| inside.0).to_vec() } else { vec!["ground-friction"] };
+    let chosen = if long() { INSIDE.map(|sizes| sizes.id).to_vec() } else { vec!["ground-friction"] };
     let (mut wrong, mut counted) = (Vec::new(), 0);
     for (index, id) in chosen.iter().enumerate() {
         let (floor, parameters) = hide(id, 1 + index % 2, 11 + index as u64);

@@ -161,20 +161,16 @@ impl RobotPlant {
     /// # Errors
     /// Why they cannot be simulated.
     pub fn play(&self, model: &Model, scene: &Scene, rows: usize) -> Result<Vec<f64>, String> {
-        let effects = model.terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
         let mut robot = self.robot.clone();
-        robot.motors_per_actuator = model.resolution as usize;
         if scene.turned_over {
             robot.material.gravity *= -1.0;
         }
-        let mut drive = Drive { waveform: Waveform::Table(scene.drive.clone()), positive_gain: 1.0, delay: 0.0 };
-        effects::apply(&effects, &mut robot, &mut drive).map_err(|error| error.to_string())?;
-        let end = robot.material.actuator_length * robot.actuators as f64;
         if scene.added > 0.0 {
-            robot.extensions.point_masses.push(PointMass { mass: scene.added, position: end });
+            let position = robot.material.actuator_length * robot.actuators as f64;
+            robot.extensions.point_masses.push(PointMass { mass: scene.added, position });
         }
-        let view = View::new(&effects);
-        let path = Path::new(&effects, robot.actuators, scene.duration);
+        let Staged { robot, drive, path, view } =
+            self.staged(robot, &model.terms, model.resolution, scene.drive.clone(), scene.duration)?;
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
         let step = self.steps.iter().copied().fold(1e-3, f64::min);
         let tracks =
@@ -378,15 +374,29 @@ impl Plant for RobotPlant {
     }
 }
 
+/// Everything that a run needs.
+struct Staged {
+    robot: Robot,
+    drive: Drive,
+    path: Path,
+    view: View,
+}
+
 impl RobotPlant {
-    fn predict_with(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64], step: f64) -> Result<Vec<f64>, String> {
+    /// A robot with causes and joints of a model, before a command.
+    fn staged(&self, mut robot: Robot, terms: &[Term], resolution: f64, command: Table, duration: f64) -> Result<Staged, String> {
         let effects = terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
-        let mut robot = self.robot.clone();
         robot.motors_per_actuator = resolution as usize;
-        let mut drive = Drive { waveform: Waveform::Table(self.commands[run].table(unknowns)), positive_gain: 1.0, delay: 0.0 };
+        let mut drive = Drive { waveform: Waveform::Table(command), positive_gain: 1.0, delay: 0.0 };
         effects::apply(&effects, &mut robot, &mut drive).map_err(|error| error.to_string())?;
-        let view = View::new(&effects);
-        let path = Path::new(&effects, robot.actuators, self.durations[run]);
+        let path = Path::new(&effects, robot.actuators, duration);
+        Ok(Staged { robot, drive, path, view: View::new(&effects) })
+    }
+
+    fn predict_with(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64], step: f64) -> Result<Vec<f64>, String> {
+        let table = self.commands[run].table(unknowns);
+        let Staged { robot, drive, path, view } =
+            self.staged(self.robot.clone(), terms, resolution, table, self.durations[run])?;
         let signal = &self.signals[run];
         // Rows at the same time stand in several channels.
         let mut times = signal.times.clone();

@@ -308,7 +308,9 @@ impl Search<'_> {
             }
         }
         // Those that may win are fitted to the end: a fit that is cut short may look better on held-out runs than one that goes further.
-        let best = |by: &dyn Fn(&Scored) -> f64| (0..trials.len()).min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)));
+        let best = |by: &dyn Fn(&Scored) -> f64| {
+            (0..trials.len()).min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
+        };
         let mut ahead = vec![best(&|scored| self.judged(scored)), best(&|scored| scored.total())];
         ahead.dedup();
         for index in ahead.into_iter().flatten() {

@@ -109,22 +109,37 @@ impl Default for Floor {
     }
 }
 
-/// Effects that can be hidden, with the ranges of a small, a medium and a large value; they may be mirrored at the value that hides nothing.
-pub const INSIDE: [(&str, [(f64, f64); 3], Option<f64>); 9] = [
-    ("ground-friction", [(0.88, 0.83), (0.78, 0.65), (0.6, 0.45)], Some(1.0)),
-    ("stick-slip", [(1.1, 1.15), (1.2, 1.3), (1.35, 1.5)], None),
-    ("contact-restitution", [(0.2, 0.3), (0.35, 0.45), (0.5, 0.6)], None),
-    ("ground-slope", [(0.7, 0.9), (1.2, 1.8), (2.2, 2.9)], Some(0.0)),
-    ("weak-actuator", [(0.98, 0.97), (0.955, 0.93), (0.9, 0.8)], None),
-    ("actuation-gain", [(0.985, 0.98), (0.97, 0.955), (0.94, 0.9)], Some(1.0)),
-    ("time-delay", [(0.004, 0.005), (0.006, 0.01), (0.012, 0.018)], None),
-    ("hysteresis", [(0.1, 0.15), (0.2, 0.3), (0.35, 0.45)], None),
-    ("camera-tilt", [(0.13, 0.2), (0.3, 0.5), (0.7, 1.5)], Some(0.0)),
+/// An effect that can be hidden, with the ranges of a small, a medium and a large value, which may be mirrored at the value that hides nothing.
+pub struct Sizes {
+    pub id: &'static str,
+    ranges: [(f64, f64); 3],
+    mirror: Option<f64>,
+}
+
+const fn one(id: &'static str, ranges: [(f64, f64); 3]) -> Sizes {
+    Sizes { id, ranges, mirror: None }
+}
+
+const fn two(id: &'static str, off: f64, ranges: [(f64, f64); 3]) -> Sizes {
+    Sizes { id, ranges, mirror: Some(off) }
+}
+
+pub const INSIDE: [Sizes; 9] = [
+    two("ground-friction", 1.0, [(0.88, 0.83), (0.78, 0.65), (0.6, 0.45)]),
+    one("stick-slip", [(1.1, 1.15), (1.2, 1.3), (1.35, 1.5)]),
+    one("contact-restitution", [(0.2, 0.3), (0.35, 0.45), (0.5, 0.6)]),
+    two("ground-slope", 0.0, [(0.7, 0.9), (1.2, 1.8), (2.2, 2.9)]),
+    one("weak-actuator", [(0.98, 0.97), (0.955, 0.93), (0.9, 0.8)]),
+    two("actuation-gain", 1.0, [(0.985, 0.98), (0.97, 0.955), (0.94, 0.9)]),
+    one("time-delay", [(0.004, 0.005), (0.006, 0.01), (0.012, 0.018)]),
+    one("hysteresis", [(0.1, 0.15), (0.2, 0.3), (0.35, 0.45)]),
+    two("camera-tilt", 0.0, [(0.13, 0.2), (0.3, 0.5), (0.7, 1.5)]),
 ];
 
 /// Hides an effect, drawn by the seed, and says its parameters in the units of the library.
 pub fn hide(id: &str, size: usize, seed: u64) -> (Floor, Vec<(&'static str, f64)>) {
-    let (_, ranges, mirror) = INSIDE.into_iter().find(|inside| inside.0 == id).unwrap_or_else(|| panic!("no effect {id}"));
+    let Sizes { ranges, mirror, .. } =
+        INSIDE.into_iter().find(|sizes| sizes.id == id).unwrap_or_else(|| panic!("no effect {id}"));
     let mut random = Random::new(seed, &format!("floor {id} {size}"));
     let drawn = random.between(ranges[size].0, ranges[size].1);
     let value = match mirror {
