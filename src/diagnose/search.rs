@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::dataset::Role;
 use super::fit::{BLOCK, Bench, Care, Fit, Residuals, places, square};
-use super::plant::{Model, Plant, Signal, Term};
+use super::plant::{Free, Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of a sixth of the noise (rms): other
 /// discretisations of one and the same physics differ by nearly that much; ...
@@ -26,6 +26,8 @@ const SEEN_BY_FIT: f64 = 0.1;
 const TIED_CHI2: f64 = 12.0;
 /// Candidates that are fitted in full after screening.
 const FINALISTS: usize = 7;
+/// Two causes are no pair if the squared sine of the angle between what they do is below this.
+const LEAST_ANGLE: f64 = 1e-3;
 /// Most turns between the runs' unknowns and the model.
 const MOST_TURNS: usize = 10;
 /// Most causes beside constants.
@@ -103,6 +105,14 @@ pub struct Trial {
     pub candidate: usize,
     /// The model with it.
     pub scored: Scored,
+}
+
+/// What causes would do if the model were linear: by how much each lowers χ² and the model to fit from, best first, and the best two together.
+pub struct Screened {
+    /// One for every start of every candidate.
+    pub ranked: Vec<(f64, Model)>,
+    /// Two causes at once, which may hide one another.
+    pub pair: Option<(f64, Model)>,
 }
 
 impl Search<'_> {
@@ -207,9 +217,9 @@ impl Search<'_> {
         Ok(scored)
     }
 
-    /// How much every start of every candidate would lower χ² on all runs if the model were linear, beside what the model's own coordinates
-    /// could do; best first, with the model to fit from.
-    pub fn screen(&self, from: &Scored) -> Result<Vec<(f64, Model)>, String> {
+    /// How much every start of every candidate, and every two of them together, would lower χ² on all runs if the model were linear, beside what the
+    /// model's own coordinates could do.
+    pub fn screen(&self, from: &Scored) -> Result<Screened, String> {
         let runs = self.split.all();
         let base = from.model();
         let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
@@ -218,46 +228,60 @@ impl Search<'_> {
         for (candidate, c) in candidates.iter().enumerate().filter(|(_, c)| !used.contains(&c.id)) {
             starts.extend(c.starts.iter().map(|x| Term { candidate, x: x.clone() }));
         }
-        let flat = |residuals: Vec<Residuals>| DVector::from_vec(residuals.concat());
         let plain = DVector::from_vec(runs.iter().flat_map(|run| from.residuals[*run].clone()).collect());
         let own = self.tangents(base, &runs, &plain)?;
         let columns: Vec<Option<DVector<f64>>> = starts
             .par_iter()
             .map(|term| {
-                let mut model = base.clone();
-                model.terms.push(term.clone());
-                self.bench.residuals_of(&model, &runs).ok().map(|r| flat(r) - &plain)
+                let model = with(base, [term.clone()]);
+                let residuals = self.bench.residuals_of(&model, &runs).ok()?;
+                let column = without(&own, &(DVector::from_vec(residuals.concat()) - &plain));
+                (column.norm_squared() > 1e-12).then_some(column)
             })
             .collect();
         let rest = without(&own, &plain);
         let mut ranked = Vec::new();
-        for (term, column) in starts.into_iter().zip(columns) {
-            let Some(column) = column else { continue };
-            let column = without(&own, &column);
-            let length = column.norm_squared();
-            if length < 1e-12 {
-                continue;
-            }
-            let along = -rest.dot(&column) / length;
-            let mut model = base.clone();
-            let c = &candidates[term.candidate];
-            let x: Vec<f64> = term
-                .x
-                .iter()
-                .zip(&c.parameters)
-                .map(|(x, p)| match p.off {
-                    Some(off) => (off + along.clamp(-1.5, 2.0) * (x - off)).clamp(p.bounds[0], p.bounds[1]),
-                    None => *x,
-                })
-                .collect();
-            let one_sided = c.parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1]));
-            // A cause that is asked for with the wrong sign starts where it was tried.
-            let wrong = one_sided && along < 0.05;
-            model.terms.push(Term { candidate: term.candidate, x: if wrong { term.x } else { x } });
-            ranked.push((if wrong { 0.0 } else { rest.dot(&column).powi(2) / length }, model));
+        let columns: Vec<(Term, DVector<f64>)> =
+            starts.into_iter().zip(columns).filter_map(|(term, column)| Some((term, column?))).collect();
+        for (term, column) in &columns {
+            let along = -rest.dot(column) / column.norm_squared();
+            let (moved, right) = self.moved(term, along);
+            let gain = if right { rest.dot(column).powi(2) / column.norm_squared() } else { 0.0 };
+            ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(ranked)
+        let mut pair: Option<(f64, Model)> = None;
+        for (index, (first, u)) in columns.iter().enumerate() {
+            for (second, v) in &columns[..index] {
+                // Least squares of −rest on the two.
+                let (uu, vv, uv, ur, vr) = (u.norm_squared(), v.norm_squared(), u.dot(v), u.dot(&rest), v.dot(&rest));
+                let determinant = uu * vv - uv * uv;
+                if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
+                    continue;
+                }
+                let (a, b) = ((uv * vr - vv * ur) / determinant, (uv * ur - uu * vr) / determinant);
+                let ((first, right), (second, also)) = (self.moved(first, a), self.moved(second, b));
+                let gain = -(a * ur + b * vr);
+                if right && also && pair.as_ref().is_none_or(|best| gain > best.0) {
+                    pair = Some((gain, with(base, [first, second])));
+                }
+            }
+        }
+        Ok(Screened { ranked, pair })
+    }
+
+    /// A start that is moved along the way from where its cause does nothing, and whether it can go that way: a cause that is asked for with the wrong
+    /// sign stays where it was tried.
+    fn moved(&self, start: &Term, along: f64) -> (Term, bool) {
+        let parameters = &self.bench.plant.candidates()[start.candidate].parameters;
+        if parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1])) && along < 0.05 {
+            return (start.clone(), false);
+        }
+        let moved = |(x, p): (&f64, &Free)| match p.off {
+            Some(off) => (off + along.clamp(-1.5, 2.0) * (x - off)).clamp(p.bounds[0], p.bounds[1]),
+            None => *x,
+        };
+        (Term { candidate: start.candidate, x: start.x.iter().zip(parameters).map(moved).collect() }, true)
     }
 
     /// Derivatives of the residuals by the model's coordinates, made orthogonal.
@@ -294,10 +318,14 @@ impl Search<'_> {
         chosen
     }
 
-    /// Every candidate worth it, fitted on top of `from`; best on held-out runs first.
-    pub fn trials(&self, from: &Scored) -> Result<Vec<Trial>, String> {
+    /// The best screened candidates fitted on top of `from`, best on held-out runs first; and the best screened pair.
+    pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Option<Model>), String> {
         (self.progress)("screening all candidates");
-        let finalists = self.finalists(self.screen(from)?, FINALISTS);
+        let Screened { ranked, pair } = self.screen(from)?;
+        // Two that do no more than the sum of what each could do alone will be found one after the other.
+        let alone = ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let pair = pair.filter(|(gain, _)| *gain > 2.0 * alone).map(|(_, model)| model);
+        let finalists = self.finalists(ranked, FINALISTS);
         let mut trials = Vec::new();
         for model in finalists {
             let Some(term) = model.terms.last() else { continue };
@@ -318,7 +346,7 @@ impl Search<'_> {
             trials[index].scored = self.fitted(&model)?;
         }
         trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
-        Ok(trials)
+        Ok((trials, pair))
     }
 
     /// What models are ranked by: χ² of the held-out runs, or of all where there are none.
@@ -331,12 +359,15 @@ impl Search<'_> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
-            let trials = self.trials(&best)?;
+            let (trials, pair) = self.trials(&best)?;
             let top = trials.first().map(|trial| trial.scored.clone());
             let last = &trials;
             let worthy = match top.filter(|top| self.is_worth(top, &best)) {
                 Some(top) => Some(top),
-                None => self.seen_by_fit_runs(&mut best, last)?,
+                None => match self.seen_by_fit_runs(&mut best, last)? {
+                    Some(seen) => Some(seen),
+                    None => self.both(pair, &best)?,
+                },
             };
             let Some(worthy) = worthy else {
                 first.get_or_insert(trials);
@@ -348,6 +379,16 @@ impl Search<'_> {
             }
         }
         Ok((best, first.unwrap_or_default()))
+    }
+
+    /// Two causes that hide one another: neither is worth it alone.
+    fn both(&self, pair: Option<Model>, base: &Scored) -> Result<Option<Scored>, String> {
+        let Some(pair) = pair else { return Ok(None) };
+        if let [.., first, second] = &pair.terms[..] {
+            (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
+        }
+        let both = self.ranked(&pair)?;
+        if self.is_worth(&both, base) { self.fitted(both.model()).map(Some) } else { Ok(None) }
     }
 
     /// Whether the fit runs miss what `less` leaves out.
@@ -415,6 +456,7 @@ impl Search<'_> {
             let without = self.fitted(&model)?;
             let screened = self
                 .screen(&without)?
+                .ranked
                 .into_iter()
                 .filter(|(_, m)| m.terms.last().is_some_and(|term| term.candidate != removed.candidate));
             for model in self.finalists(screened.collect(), most) {
@@ -452,6 +494,13 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// A model with more terms.
+fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
+    let mut model = base.clone();
+    model.terms.extend(terms);
+    model
 }
 
 /// What of a vector is orthogonal to unit vectors.
@@ -559,5 +608,113 @@ impl Pace {
         // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
         let jumps = largest > 6.0 * way / rows && largest > 0.05 * range;
         Self { run, speed: way / range / f64::max(time, 1e-9), range, jumps }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::plant::Candidate;
+
+    /// Two slow waves that differ little, as far as candidates go; runs of their sum with noise.
+    struct Waves {
+        signals: Vec<Signal>,
+        candidates: Vec<Candidate>,
+    }
+
+    const VALUES: usize = 400;
+
+    fn wave(id: &str, run: usize, at: usize) -> f64 {
+        let t = at as f64 / VALUES as f64 + 0.1 * run as f64;
+        match id {
+            "first" => (7.0 * t).sin(),
+            "second" => -(7.0 * t + 0.12).sin(),
+            _ => (23.0 * t).cos(),
+        }
+    }
+
+    impl Waves {
+        fn new(of: &[(&str, f64)]) -> Self {
+            let signal = |run: usize| {
+                let value = |at: usize| {
+                    let noise = (1.0 + (run * VALUES + at) as f64).sin() * 43_758.545_3;
+                    // Uniform noise of unit variance.
+                    let noise = (noise - noise.floor() - 0.5) * 12_f64.sqrt();
+                    of.iter().map(|(id, x)| x * wave(id, run, at)).sum::<f64>() + noise
+                };
+                Signal {
+                    id: format!("run {run}"),
+                    values: (0..VALUES).map(value).collect(),
+                    sigmas: vec![1.0; VALUES],
+                    times: (0..VALUES).map(|at| at as f64).collect(),
+                    channels: vec![0; VALUES],
+                    inputs: (0..VALUES).map(|at| (at as f64 * (1.0 + run as f64) / 50.0).sin()).collect(),
+                }
+            };
+            let candidate = |id: &'static str| Candidate {
+                id,
+                kind: "test",
+                cause: "A wave.",
+                is_constant: false,
+                parameters: vec![Free {
+                    name: "x",
+                    unit: "",
+                    off: Some(0.0),
+                    bounds: [-100.0, 100.0],
+                    scale: 1.0,
+                    inverse: false,
+                }],
+                fixed: Vec::new(),
+                starts: vec![vec![1.0]],
+            };
+            Self { signals: (0..6).map(signal).collect(), candidates: ["other", "first", "second"].map(candidate).to_vec() }
+        }
+    }
+
+    impl Plant for Waves {
+        fn signals(&self) -> &[Signal] {
+            &self.signals
+        }
+
+        fn channels(&self) -> Vec<String> {
+            vec!["y".into()]
+        }
+
+        fn unit(&self) -> &'static str {
+            ""
+        }
+
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+
+        fn predict(&self, model: &Model, run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
+            let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
+            Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
+        }
+    }
+
+    fn found(plant: &Waves) -> Vec<&'static str> {
+        let progress = |_: &str| {};
+        let bench = Bench::new(plant);
+        let mut search = Search { bench, split: split(plant, &[Role::Auto; 6]), unexplained: 0.0, progress: &progress };
+        let plain = search.calibrated(1.0).unwrap();
+        let (best, _) = search.forward(plain).unwrap();
+        best.model().terms.iter().map(|term| search.id(term.candidate)).collect()
+    }
+
+    #[test]
+    fn two_causes_that_hide_one_another_are_found_together() {
+        // Together they make a wave of amplitude 0.12 × 12; one of them alone can take up 0.4 % of its square.
+        let mut both = found(&Waves::new(&[("first", 12.0), ("second", 12.0)]));
+        both.sort_unstable();
+        assert_eq!(both, ["first", "second"]);
+    }
+
+    #[test]
+    fn one_cause_stays_one_and_noise_stays_noise() {
+        assert_eq!(found(&Waves::new(&[("other", 1.0)])), ["other"]);
+        assert_eq!(found(&Waves::new(&[("first", 1.0)])), ["first"]);
+        assert!(found(&Waves::new(&[])).is_empty());
     }
 }
