@@ -4,7 +4,7 @@
 #   bash scripts/test.sh          the tests of `cargo test`, the live PyBullet check among them
 #   bash scripts/test.sh --long   besides: the shim under sanitizers, a run under valgrind, the whole reproduction of
 #                                 the paper (some minutes), the refusal of a machine without Bullet
-#   bash scripts/test.sh --hidden besides the first: every effect hidden in data and looked for (a quarter of an hour)
+#   bash scripts/test.sh --hidden besides the first: every effect hidden in data and looked for, which takes long
 #
 # CI sets CI=true, which means --long.
 set -euo pipefail

@@ -1,7 +1,7 @@
 //! Effects hidden in data of a robot on the floor, which the Bullet engine makes and the planar engine explains.
 //!
-//! The short suite runs a sample of it, `SFERS_LONG=1` all; `cargo run --release --example confusability -- 0,1,2 5 0.1 floor` prints the matrix of
-//! docs/validation.md.
+//! The short suite runs a sample of it, `SFERS_LONG=1` all; `cargo run --release --example confusability -- 1 5 0.1 floor` prints the matrix of
+//! docs/confusability.md.
 
 #[path = "hidden/generator.rs"]
 mod generator;

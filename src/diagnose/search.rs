@@ -24,7 +24,7 @@ const LEAST_BIC: f64 = 10.0;
 const SEEN_BY_FIT: f64 = 0.1;
 /// Two models are tied if their χ² differ by less than this, or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
-/// Candidates that are fitted in full after screening.
+/// Candidates that are fitted after screening.
 const FINALISTS: usize = 7;
 /// Two causes are no pair if the squared sine of the angle between what they do is below this.
 const LEAST_ANGLE: f64 = 1e-3;
@@ -107,12 +107,14 @@ pub struct Trial {
     pub scored: Scored,
 }
 
-/// What causes would do if the model were linear: by how much each lowers χ² and the model to fit from, best first, and the best two together.
+/// What causes would do if the model were linear.
 pub struct Screened {
-    /// One for every start of every candidate.
+    /// By how much every start of every candidate would lower χ², and the model to fit from, best first.
     pub ranked: Vec<(f64, Model)>,
-    /// Two causes at once, which may hide one another.
-    pub pair: Option<(f64, Model)>,
+    /// Every start with what it adds to the residuals beside the model's own coordinates.
+    columns: Vec<(Term, DVector<f64>)>,
+    /// The residuals beside the model's own coordinates.
+    rest: DVector<f64>,
 }
 
 impl Search<'_> {
@@ -217,8 +219,7 @@ impl Search<'_> {
         Ok(scored)
     }
 
-    /// How much every start of every candidate, and every two of them together, would lower χ² on all runs if the model were linear, beside what the
-    /// model's own coordinates could do.
+    /// How much every start of every candidate would lower χ² on all runs if the model were linear, beside what the model's own coordinates could do.
     pub fn screen(&self, from: &Scored) -> Result<Screened, String> {
         let runs = self.split.all();
         let base = from.model();
@@ -250,11 +251,20 @@ impl Search<'_> {
             ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut pair: Option<(f64, Model)> = None;
+        Ok(Screened { ranked, columns, rest })
+    }
+
+    /// The two screened causes that would lower χ² most together, if they do by more than twice what the best does alone: others will be found one
+    /// after the other.
+    fn pair(&self, base: &Model, screened: &Screened) -> Option<Model> {
+        let Screened { ranked, columns, rest } = screened;
+        let mut least = 2.0 * ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let sizes: Vec<[f64; 2]> = columns.iter().map(|(_, u)| [u.norm_squared(), u.dot(rest)]).collect();
+        let mut pair = None;
         for (index, (first, u)) in columns.iter().enumerate() {
-            for (second, v) in &columns[..index] {
+            for (other, (second, v)) in columns[..index].iter().enumerate() {
                 // Least squares of −rest on the two.
-                let (uu, vv, uv, ur, vr) = (u.norm_squared(), v.norm_squared(), u.dot(v), u.dot(&rest), v.dot(&rest));
+                let ([uu, ur], [vv, vr], uv) = (sizes[index], sizes[other], u.dot(v));
                 let determinant = uu * vv - uv * uv;
                 if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
                     continue;
@@ -262,12 +272,13 @@ impl Search<'_> {
                 let (a, b) = ((uv * vr - vv * ur) / determinant, (uv * ur - uu * vr) / determinant);
                 let ((first, right), (second, also)) = (self.moved(first, a), self.moved(second, b));
                 let gain = -(a * ur + b * vr);
-                if right && also && pair.as_ref().is_none_or(|best| gain > best.0) {
-                    pair = Some((gain, with(base, [first, second])));
+                if right && also && gain > least {
+                    least = gain;
+                    pair = Some(with(base, [first, second]));
                 }
             }
         }
-        Ok(Screened { ranked, pair })
+        pair
     }
 
     /// A start that is moved along the way from where its cause does nothing, and whether it can go that way: a cause that is asked for with the wrong
@@ -307,25 +318,22 @@ impl Search<'_> {
     }
 
     /// The best screened starts of different candidates, `count` of them.
-    fn finalists(&self, screened: Vec<(f64, Model)>, count: usize) -> Vec<Model> {
+    fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
         let mut chosen: Vec<Model> = Vec::new();
         for (_, model) in screened {
             let last = |model: &Model| model.terms.last().map(|term| term.candidate);
-            if chosen.len() < count && !chosen.iter().any(|other| last(other) == last(&model)) {
-                chosen.push(model);
+            if chosen.len() < count && !chosen.iter().any(|other| last(other) == last(model)) {
+                chosen.push(model.clone());
             }
         }
         chosen
     }
 
-    /// The best screened candidates fitted on top of `from`, best on held-out runs first; and the best screened pair.
-    pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Option<Model>), String> {
+    /// The best screened candidates fitted on top of `from`, best on held-out runs first; and what was screened.
+    pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), String> {
         (self.progress)("screening all candidates");
-        let Screened { ranked, pair } = self.screen(from)?;
-        // Two that do no more than the sum of what each could do alone will be found one after the other.
-        let alone = ranked.first().map_or(0.0, |(gain, _)| *gain);
-        let pair = pair.filter(|(gain, _)| *gain > 2.0 * alone).map(|(_, model)| model);
-        let finalists = self.finalists(ranked, FINALISTS);
+        let screened = self.screen(from)?;
+        let finalists = self.finalists(&screened.ranked, FINALISTS);
         let mut trials = Vec::new();
         for model in finalists {
             let Some(term) = model.terms.last() else { continue };
@@ -346,7 +354,7 @@ impl Search<'_> {
             trials[index].scored = self.fitted(&model)?;
         }
         trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
-        Ok((trials, pair))
+        Ok((trials, screened))
     }
 
     /// What models are ranked by: χ² of the held-out runs, or of all where there are none.
@@ -359,14 +367,13 @@ impl Search<'_> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
-            let (trials, pair) = self.trials(&best)?;
+            let (trials, screened) = self.trials(&best)?;
             let top = trials.first().map(|trial| trial.scored.clone());
-            let last = &trials;
             let worthy = match top.filter(|top| self.is_worth(top, &best)) {
                 Some(top) => Some(top),
-                None => match self.seen_by_fit_runs(&mut best, last)? {
+                None => match self.seen_by_fit_runs(&mut best, &trials)? {
                     Some(seen) => Some(seen),
-                    None => self.both(pair, &best)?,
+                    None => self.both(&screened, &best),
                 },
             };
             let Some(worthy) = worthy else {
@@ -381,14 +388,14 @@ impl Search<'_> {
         Ok((best, first.unwrap_or_default()))
     }
 
-    /// Two causes that hide one another: neither is worth it alone.
-    fn both(&self, pair: Option<Model>, base: &Scored) -> Result<Option<Scored>, String> {
-        let Some(pair) = pair else { return Ok(None) };
+    /// Two causes that hide one another: neither is worth it alone. What cannot be fitted is no explanation.
+    fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
+        let pair = self.pair(base.model(), screened)?;
         if let [.., first, second] = &pair.terms[..] {
             (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
         }
-        let both = self.ranked(&pair)?;
-        if self.is_worth(&both, base) { self.fitted(both.model()).map(Some) } else { Ok(None) }
+        let both = self.ranked(&pair).ok().filter(|both| self.is_worth(both, base))?;
+        self.fitted(both.model()).ok()
     }
 
     /// Whether the fit runs miss what `less` leaves out.
@@ -424,20 +431,20 @@ impl Search<'_> {
     pub fn backward(&self, from: Scored) -> Result<Scored, String> {
         let mut best = from;
         loop {
-            let mut shorter: Vec<Scored> = Vec::new();
-            for index in 0..best.model().terms.len() {
+            let shorter = |index: usize| {
                 let mut model = best.model().clone();
                 let term = model.terms.remove(index);
                 (self.progress)(&format!("doing without {}", self.id(term.candidate)));
-                shorter.push(self.fitted(&model)?);
-            }
+                self.fitted(&model)
+            };
             // What the discretisation could do as well goes first.
             let plant = self.bench.plant;
             let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
             if let Some(idle) = idle {
-                best = shorter.swap_remove(idle);
+                best = shorter(idle)?;
                 continue;
             }
+            let shorter = (0..best.model().terms.len()).map(shorter).collect::<Result<Vec<_>, _>>()?;
             let least = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total()));
             match least {
                 Some(least) if !self.is_worth(&best, &least) && !self.is_seen_by_fit(&best, &least) => best = least,
@@ -454,12 +461,9 @@ impl Search<'_> {
             let removed = model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             let without = self.fitted(&model)?;
-            let screened = self
-                .screen(&without)?
-                .ranked
-                .into_iter()
-                .filter(|(_, m)| m.terms.last().is_some_and(|term| term.candidate != removed.candidate));
-            for model in self.finalists(screened.collect(), most) {
+            let screened = self.screen(&without)?.ranked;
+            let others = screened.iter().filter(|(_, m)| m.terms.last().is_some_and(|term| term.candidate != removed.candidate));
+            for model in self.finalists(others, most) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
                 if let Ok(scored) = self.ranked(&model) {
