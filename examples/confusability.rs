@@ -17,7 +17,7 @@ mod judge;
 use std::path::Path;
 
 use generator::{Case, INSIDE, OUTSIDE};
-use judge::{diagnosed, holds, is_right, physics};
+use judge::{diagnosed, is_right, physics, range};
 use sfers::diagnose::verdict::{Diagnosis, Verdict};
 
 fn numbers<T: std::str::FromStr + Clone>(argument: Option<&String>, default: &[T]) -> Vec<T> {
@@ -88,21 +88,26 @@ fn main() {
                 }
             })
             .collect();
-        let inside = truths.iter().filter_map(|(id, name, value)| holds(&d, id, name, *value));
-        let inside: Vec<bool> = inside.collect();
+        let inside: Vec<(bool, String)> = truths
+            .iter()
+            .filter_map(|(id, name, value)| {
+                let [low, high] = range(&d, id, name)?;
+                let holds = low <= *value && *value <= high;
+                Some((holds, if holds { "yes".into() } else { format!("no: {value:.4}, not {low:.4} to {high:.4}") }))
+            })
+            .collect();
         // A trace below three times the noise need not be found.
         if trace_mm >= 3.0 * noise_mm || truths.is_empty() {
             counted += 1;
             right += usize::from(is_expected(&d, id));
             ranges += inside.len();
-            inside_range += inside.iter().filter(|holds| **holds).count();
+            inside_range += inside.iter().filter(|(holds, _)| *holds).count();
         }
-        let inside: Vec<&str> = inside.iter().map(|holds| if *holds { "yes" } else { "no" }).collect();
         println!(
             "| {id} | {size}, {noise_mm} | {trace_mm:.2} | {:?} | {} | {} | {:.2} | {:.1} % |",
             d.verdict,
             found.join(" + "),
-            inside.join(", "),
+            inside.iter().map(|(_, said)| said.as_str()).collect::<Vec<_>>().join(", "),
             d.extended.rmse_heldout_mm / d.noise_mm,
             100.0 * d.unexplained_fraction
         );

@@ -1,5 +1,7 @@
 //! The command as a user types it: results, messages, exit codes, files.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -28,12 +30,7 @@ impl Bench {
     }
 
     fn sfers(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_sfers"))
-            .args(arguments)
-            .current_dir(self.0.path())
-            .stdin(Stdio::null())
-            .output()
-            .unwrap()
+        common::sfers(self.0.path(), arguments)
     }
 
     /// Runs `a.toml` with arguments; demands an exit code and words on stderr, and no file but those that were there.

@@ -1,6 +1,9 @@
 //! The same bits from one and four threads, from two processes, and after a restore in the middle of a jump.
 
-use sfers::engine::{BulletEngine, Engine};
+mod common;
+
+use common::advance;
+use sfers::engine::BulletEngine;
 use sfers::experiment::{self, Control, Experiment, Source};
 
 /// A jump of the whole robot: 12,000 steps, in the air from about step 6,000 on.
@@ -19,20 +22,6 @@ fn bits(experiment: &Experiment) -> Vec<u64> {
     let r = run.recording;
     let arrays = [r.time, r.angles, r.rates, r.torques, r.motor_voltages, r.positions, r.velocities];
     arrays.iter().flatten().map(|value| value.to_bits()).collect()
-}
-
-/// Steps an engine from `from` to `to`, with the loop of `experiment::run`.
-fn advance(experiment: &Experiment, engine: &mut dyn Engine, from: u64, to: u64) -> Vec<u64> {
-    let mut voltages = vec![0.0; experiment.robot.actuators];
-    let mut bits = Vec::new();
-    for step in from..to {
-        experiment.drive.voltages(step.saturating_sub(1) as f64 * experiment.time_step, &mut voltages);
-        engine.prepare(&voltages).unwrap();
-        let joints = engine.joints();
-        bits.extend(joints.angles.iter().chain(&joints.rates).chain(&joints.torques).map(|value| value.to_bits()));
-        engine.advance().unwrap();
-    }
-    bits
 }
 
 #[test]

@@ -1,14 +1,13 @@
 //! `sfers diagnose` as a user types it: the samples, what it writes, and bad data.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
+use common::sfers;
 use serde_json::Value;
-
-fn sfers(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sfers")).args(arguments).current_dir(folder).stdin(Stdio::null()).output().unwrap()
-}
 
 fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/datasets").join(name).join("dataset.toml")
@@ -75,7 +74,8 @@ fn the_samples_with_hysteresis_and_with_nothing_are_told_apart() {
     assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("none"), vec![]));
     let required = sfers(
         folder.path(),
-        &["diagnose", sample("sample-nothing-hidden").to_str().unwrap(), "--out", "e", "--require", "--quiet"],
+        // A folder stands for the description in it.
+        &["diagnose", sample("sample-nothing-hidden").parent().unwrap().to_str().unwrap(), "--out", "e", "--require", "--quiet"],
     );
     assert_eq!(required.status.code(), Some(1));
 }

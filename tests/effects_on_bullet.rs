@@ -1,5 +1,8 @@
 //! The effects that act on bodies, clamp and floor, on Bullet: as the planar engine has them, and as mechanics says.
 
+mod common;
+
+use common::advance;
 use sfers::engine::{BulletEngine, Engine, FrictionModel, PlanarEngine};
 use sfers::experiment::{self, Control, Experiment, Source};
 use sfers::model::Robot;
@@ -258,18 +261,7 @@ fn a_jump_with_all_of_them_is_as_high_as_on_the_planar_engine() {
 #[test]
 fn a_jump_with_all_of_them_goes_on_from_a_saved_state_with_the_same_bits() {
     let experiment = jump("bullet");
-    let bits = |engine: &mut dyn Engine, from: u64, to: u64| {
-        let mut voltages = vec![0.0; experiment.robot.actuators];
-        let mut bits = Vec::new();
-        for step in from..to {
-            experiment.drive.voltages(step.saturating_sub(1) as f64 * experiment.time_step, &mut voltages);
-            engine.prepare(&voltages).unwrap();
-            let joints = engine.joints();
-            bits.extend(joints.angles.iter().chain(&joints.rates).map(|value| value.to_bits()));
-            engine.advance().unwrap();
-        }
-        bits
-    };
+    let bits = |engine: &mut dyn Engine, from: u64, to: u64| advance(&experiment, engine, from, to);
     let mut engine = experiment.engine().unwrap();
     let mut from = 0;
     // Before the jump, in the air, and about the landing.

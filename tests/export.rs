@@ -1,9 +1,11 @@
 //! URDF and MJCF files: those in `urdf/`, the way back through urdf-rs with the same bits, and files that are no robot.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
 
+use common::sfers;
 use proptest::prelude::*;
 use sfers::experiment::{self, Control, Experiment, Source};
 use sfers::export;
@@ -14,10 +16,6 @@ fn from_preset(preset: &str, settings: &[&str]) -> Experiment {
         source.set(setting).unwrap();
     }
     experiment::experiment(&source).unwrap()
-}
-
-fn sfers(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sfers")).args(arguments).current_dir(folder).stdin(Stdio::null()).output().unwrap()
 }
 
 /// All bits of a short run.
@@ -167,7 +165,7 @@ fn nesting_without_end_is_an_error_and_no_crash() {
 #[test]
 fn the_command_exports_and_runs_a_file_and_refuses_a_bad_one() {
     let folder = tempfile::tempdir().unwrap();
-    let run = |arguments: &[&str]| sfers(arguments, folder.path());
+    let run = |arguments: &[&str]| sfers(folder.path(), arguments);
     fs::write(folder.path().join("a.toml"), experiment::presets::find("cantilever-dc").unwrap().text).unwrap();
     let output = run(&["urdf", "a.toml", "--out", "a.urdf"]);
     assert!(output.status.success() && folder.path().join("a.urdf.json").exists());

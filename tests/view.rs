@@ -1,5 +1,7 @@
 //! Figures and animations as a user makes them, from this program's recordings and the reference's, and the page in a browser.
 
+mod common;
+
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
@@ -31,12 +33,7 @@ impl Bench {
     }
 
     fn sfers(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_sfers"))
-            .args(arguments)
-            .current_dir(self.0.path())
-            .stdin(Stdio::null())
-            .output()
-            .unwrap()
+        common::sfers(self.0.path(), arguments)
     }
 
     fn done(&self, arguments: &[&str]) -> String {

@@ -18,7 +18,7 @@ use crate::diagnose::{extended, observations, protocols, quality, report, robot:
 /// Example: sfers diagnose bench-7/dataset.toml --out diagnosis
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The description of the data, or preset:NAME.
+    /// The description of the data, the folder of its dataset.toml, or preset:NAME.
     dataset: PathBuf,
     /// Folder of the results.
     #[arg(long, value_name = "DIR")]

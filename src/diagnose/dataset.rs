@@ -162,11 +162,13 @@ impl Dataset {
         self.markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}", marker.name))).collect()
     }
 
-    /// Reads a description, a file or `preset:NAME`, and its runs.
+    /// Reads a description, a file (`dataset.toml` of a folder) or `preset:NAME`, and its runs.
     ///
     /// # Errors
     /// [`DataError`] with file, line and column.
     pub fn read(path: &Path) -> Result<Self, DataError> {
+        let in_folder = path.join("dataset.toml");
+        let path = if path.is_dir() { &in_folder } else { path };
         let preset = path.to_str().and_then(|path| path.strip_prefix("preset:")).and_then(presets::find_dataset);
         let text = match preset {
             Some(preset) => preset.text.to_owned(),

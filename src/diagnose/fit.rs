@@ -280,33 +280,35 @@ impl<'a> Bench<'a> {
         Ok(self.fit_held(&model, runs, Care::Full, Some((term, parameter)))?.chi2)
     }
 
-    /// How much larger than for independent noise the variance of each coordinate is, from the residuals as they are: with blocks b of fifty
-    /// values, C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against C = (JᵀJ)⁻¹; at least 1, and at least χ² per value.
+    /// How much larger than for independent noise the variance of each coordinate is, from the residuals as they are: with blocks b of values that
+    /// may hang together, C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against C = (JᵀJ)⁻¹. Blocks are fifty values, and whole runs (of R, by R/(R − 1) more): the
+    /// larger counts, and it is at least 1, and at least χ² per value.
     ///
     /// # Errors
     /// If the model cannot be simulated.
     pub fn inflation(&self, model: &Model, runs: &[usize], covariance: &DMatrix<f64>) -> Result<Vec<f64>, String> {
         let (residuals, derivatives) = self.linearised(model, runs)?;
         let n = derivatives.len();
-        let mut meat = DMatrix::zeros(n, n);
-        for run in 0..runs.len() {
-            let values = residuals[run].len();
-            for from in (0..values).step_by(BLOCK) {
-                let to = (from + BLOCK).min(values);
-                let score =
-                    DVector::from_fn(n, |k, _| (from..to).map(|i| derivatives[k][run][i] * residuals[run][i]).sum::<f64>());
-                meat += &score * score.transpose();
+        let ratios = |block: usize| -> Vec<f64> {
+            let mut meat = DMatrix::zeros(n, n);
+            for run in 0..runs.len() {
+                let values = residuals[run].len();
+                for from in (0..values).step_by(block) {
+                    let to = from.saturating_add(block).min(values);
+                    let score =
+                        DVector::from_fn(n, |k, _| (from..to).map(|i| derivatives[k][run][i] * residuals[run][i]).sum::<f64>());
+                    meat += &score * score.transpose();
+                }
             }
-        }
+            let sandwich = covariance * meat * covariance;
+            (0..n).map(|k| sandwich[(k, k)] / covariance[(k, k)]).collect()
+        };
+        let few = runs.len() as f64 / (runs.len() as f64 - 1.0).max(1.0);
         let count = self.count(runs).max(1) as f64;
         let least = (residuals.iter().map(|r| square(r)).sum::<f64>() / count).max(1.0);
-        let sandwich = covariance * meat * covariance;
-        Ok((0..n)
-            .map(|k| {
-                let ratio = sandwich[(k, k)] / covariance[(k, k)];
-                if ratio.is_finite() { ratio.max(least) } else { least }
-            })
-            .collect())
+        let (short, whole) = (ratios(BLOCK), ratios(usize::MAX));
+        // Where the runs say nothing of a coordinate its ratio is not a number, and `max` takes the other.
+        Ok(short.into_iter().zip(whole).map(|(short, whole)| least.max(short).max(few * whole)).collect())
     }
 
     /// Leaves out values whose residuals stand far above those around them in their channel: what a tracker lost for a row or two. Returns how many.

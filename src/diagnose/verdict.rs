@@ -440,7 +440,7 @@ fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -> Result<In
     Ok(Intervals { ends, sizes, correlations, condition: condition(&scored.fit.information) })
 }
 
-/// How far each coordinate moves with the discretisation, to the next coarser number of joints and with the time step, and with constants that are
+/// How far each coordinate moves with the discretisation, to the next coarser number of joints (if it was refined) and with the time step, and with constants that are
 /// nominal because the discretisation could do what they did.
 fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, String> {
     let coordinates = |model: &Model| -> Vec<f64> { model.terms.iter().flat_map(|term| term.x.clone()).collect() };
@@ -449,9 +449,11 @@ fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, String> {
     let at = ladder.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
     let mut moved = vec![0.0; own.len()];
     let mut others = Vec::new();
-    if at > 0 && !own.is_empty() {
+    if !own.is_empty() {
         (search.progress)("how far the discretisation matters");
-        others.push(search.fitted(&Model { resolution: ladder[at - 1], ..best.model().clone() })?);
+        if at > 0 {
+            others.push(search.fitted(&Model { resolution: ladder[at - 1], ..best.model().clone() })?);
+        }
         others.push(search.fitted(&Model { fine: false, ..best.model().clone() })?);
         others.push(search.fitted(&search.with_constants(best.model()))?);
     }

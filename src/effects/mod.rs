@@ -83,6 +83,13 @@ pub struct Parameter {
     pub about: &'static str,
 }
 
+impl Parameter {
+    /// A factor, 1 where it changes nothing.
+    const fn scale(bounds: [f64; 2], about: &'static str) -> Self {
+        Self { name: "scale", unit: "", bounds, off: Some(1.0), default: None, about }
+    }
+}
+
 /// Where and how an effect acts. All functions take the parameters in the order of the description, in the units of files.
 #[derive(Debug, Clone, Copy)]
 pub enum Action {

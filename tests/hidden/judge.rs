@@ -44,13 +44,16 @@ pub fn is_right(d: &Diagnosis, hidden: &str) -> bool {
         && (effect.id == hidden || effect.tied_with.iter().any(|id| id == hidden))
 }
 
-/// Whether the range of a parameter of the cause holds the true value; none if it has no such range.
-pub fn holds(d: &Diagnosis, hidden: &str, parameter: &str, value: f64) -> Option<bool> {
+/// The range of a parameter of the cause; none if it is not named or an end is missing.
+pub fn range(d: &Diagnosis, hidden: &str, parameter: &str) -> Option<[f64; 2]> {
     let of_cause = physics(d).into_iter().filter(|effect| effect.id == hidden);
-    match of_cause.flat_map(|effect| &effect.parameters).find(|p| p.name == parameter)?.ci95 {
-        [Some(low), Some(high)] => Some(low <= value && value <= high),
-        _ => None,
-    }
+    let [low, high] = of_cause.flat_map(|effect| &effect.parameters).find(|p| p.name == parameter)?.ci95;
+    Some([low?, high?])
+}
+
+/// Whether it holds the true value.
+pub fn holds(d: &Diagnosis, hidden: &str, parameter: &str, value: f64) -> Option<bool> {
+    range(d, hidden, parameter).map(|[low, high]| low <= value && value <= high)
 }
 
 /// Whether the longer suites run.

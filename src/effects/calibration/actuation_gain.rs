@@ -13,13 +13,6 @@ pub const ACTUATION_GAIN: Effect = Effect {
     cause: "The curvature per volt differs from nominal: charge constant, thickness, bond layer or driver gain.",
     equation: "θ_V = −s·γ·ℓ·V",
     source: "Free strain: Williams, thesis, 2004; shear lag in the bond: Crawley and de Luis 1987.",
-    parameters: &[Parameter {
-        name: "scale",
-        unit: "",
-        bounds: [0.4, 2.0],
-        off: Some(1.0),
-        default: None,
-        about: "factor s on the curvature per volt",
-    }],
+    parameters: &[Parameter::scale([0.4, 2.0], "factor s on the curvature per volt")],
     action: Action::Robot(|p, robot| robot.extensions.gain_scale *= p[0]),
 };

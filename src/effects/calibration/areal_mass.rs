@@ -13,13 +13,6 @@ pub const AREAL_MASS: Effect = Effect {
     cause: "The mass per area differs from nominal: density, glue or coating.",
     equation: "M = s·μ_A·w·L",
     source: "Derived; data sheet of the MFC actuator, Smart Material Corp.",
-    parameters: &[Parameter {
-        name: "scale",
-        unit: "",
-        bounds: [0.5, 2.0],
-        off: Some(1.0),
-        default: None,
-        about: "factor s on the mass of every link",
-    }],
+    parameters: &[Parameter::scale([0.5, 2.0], "factor s on the mass of every link")],
     action: Action::Robot(|p, robot| robot.extensions.mass_scale *= p[0]),
 };

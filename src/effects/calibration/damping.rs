@@ -13,13 +13,6 @@ pub const DAMPING: Effect = Effect {
     cause: "The viscous coefficient differs from nominal.",
     equation: "τ = −k·(θ − θ_V + s·η·θ̇)",
     source: "Derived from eq. 1; damping from a step response: Zheng et al., ICRA 2022.",
-    parameters: &[Parameter {
-        name: "scale",
-        unit: "",
-        bounds: [0.02, 20.0],
-        off: Some(1.0),
-        default: None,
-        about: "factor s on the damping time η",
-    }],
+    parameters: &[Parameter::scale([0.02, 20.0], "factor s on the damping time η")],
     action: Action::Robot(|p, robot| robot.extensions.damping_scale *= p[0]),
 };

@@ -13,13 +13,6 @@ pub const STIFFNESS: Effect = Effect {
     cause: "Moduli, thickness or bond differ from nominal, so every joint is stiffer or softer by one factor.",
     equation: "τ = −s·k·(θ − θ_V + η·θ̇)",
     source: "Derived from eq. 1; spread of MFC parameters: Hu, Smith, Hays, Oates, CDC-ECC 2011.",
-    parameters: &[Parameter {
-        name: "scale",
-        unit: "",
-        bounds: [0.5, 2.0],
-        off: Some(1.0),
-        default: None,
-        about: "factor s on the stiffness k",
-    }],
+    parameters: &[Parameter::scale([0.5, 2.0], "factor s on the stiffness k")],
     action: Action::Robot(|p, robot| robot.extensions.stiffness_scale *= p[0]),
 };

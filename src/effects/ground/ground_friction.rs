@@ -13,13 +13,6 @@ pub const GROUND_FRICTION: Effect = Effect {
     cause: "The coefficient of friction differs from nominal.",
     equation: "|F_t| ≤ s·μ_link·μ_ground·N",
     source: "The reference and Bullet: the product of two coefficients, at most 10.",
-    parameters: &[Parameter {
-        name: "scale",
-        unit: "",
-        bounds: [0.1, 5.0],
-        off: Some(1.0),
-        default: None,
-        about: "factor s on the coefficients",
-    }],
+    parameters: &[Parameter::scale([0.1, 5.0], "factor s on the coefficients")],
     action: Action::Robot(|p, robot| robot.extensions.friction_scale *= p[0]),
 };

@@ -13,13 +13,6 @@ pub const SENSOR_SCALE: Effect = Effect {
     cause: "Wrong pixels per millimetre, perspective, or gain.",
     equation: "y_m = s·y",
     source: "From general knowledge.",
-    parameters: &[Parameter {
-        name: "scale",
-        unit: "",
-        bounds: [0.5, 2.0],
-        off: Some(1.0),
-        default: None,
-        about: "factor s on positions",
-    }],
+    parameters: &[Parameter::scale([0.5, 2.0], "factor s on positions")],
     action: Action::View(|p, view| view.scale *= p[0]),
 };
