@@ -18,7 +18,7 @@ use std::path::Path;
 
 use generator::{Case, INSIDE, OUTSIDE};
 use judge::{diagnosed, is_right, physics, range};
-use sfers::diagnose::verdict::{Diagnosis, Verdict};
+use sfers::diagnose::diagnosis::{Diagnosis, Verdict};
 
 fn numbers<T: std::str::FromStr + Clone>(argument: Option<&String>, default: &[T]) -> Vec<T> {
     argument.map_or(default.to_vec(), |list| list.split(',').filter_map(|item| item.parse().ok()).collect())

@@ -12,7 +12,8 @@ mod judge;
 
 use generator::{Case, INSIDE, OUTSIDE, Truth};
 use judge::{diagnosed, holds, is_right, long, names};
-use sfers::diagnose::verdict::{Outcome, Verdict};
+use sfers::diagnose::diagnosis::Verdict;
+use sfers::diagnose::verdict::Outcome;
 
 /// Writes the case's data and diagnoses them.
 fn found(case: &Case) -> (Truth, Outcome) {

@@ -12,7 +12,8 @@ mod judge;
 
 use ground::{Film, INSIDE, film, hide, nominal, trace, write};
 use judge::{diagnosed, holds, is_right, long, names};
-use sfers::diagnose::verdict::{Outcome, Verdict};
+use sfers::diagnose::diagnosis::Verdict;
+use sfers::diagnose::verdict::Outcome;
 
 const NOISE_MM: f64 = 0.1;
 

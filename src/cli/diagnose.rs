@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::output::{finish, pending, unwritable};
 use super::{Failure, Options, print};
 use crate::diagnose::dataset::{DataError, Dataset};
+use crate::diagnose::diagnosis::Verdict;
 use crate::diagnose::{extended, observations, protocols, quality, report, robot::RobotPlant, verdict};
 
 /// Say what the simulation gets wrong beside measured data, name the cause, and measure what it gains on runs that no fit saw.
@@ -100,6 +101,6 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         }
         print(&text)?;
     }
-    let identified = matches!(diagnosis.verdict, verdict::Verdict::Named | verdict::Verdict::Tied);
+    let identified = matches!(diagnosis.verdict, Verdict::Named | Verdict::Tied);
     Ok(if args.require && !identified { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }

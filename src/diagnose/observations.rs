@@ -3,10 +3,10 @@
 //! A handful of numbers cannot be split into fit and held-out, and cannot name a cause; they can rule causes out, and say what ties them.
 
 use super::dataset::{Dataset, Observation};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
 use super::fit::{Bench, Care, Fit};
 use super::plant::{Candidate, Model, Plant, Signal, Term};
 use super::robot;
-use super::verdict::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
 use crate::experiment::{self, Config, Control, EffectConfig, Source};
 use crate::recording::measures::Measures;
 use crate::view::escape;

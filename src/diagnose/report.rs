@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
+use super::diagnosis::{Diagnosis, Estimate, Stage, Verdict};
 use super::fit::Residuals;
 use super::plant::{Plant, Signal};
-use super::verdict::{Diagnosis, Estimate, Outcome, Stage, Verdict};
+use super::verdict::Outcome;
 use crate::view::{Figure, Mark, escape};
 
 const STYLE: &str = "body{font:15px/1.5 Helvetica,Arial,sans-serif;color:#111;max-width:1020px;margin:0 auto;padding:18px}\

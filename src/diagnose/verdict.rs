@@ -1,13 +1,12 @@
 //! The whole loop, from a plant to a [`Diagnosis`].
 
-use nalgebra::DMatrix;
-use serde::Serialize;
-
 use super::dataset::Role;
-use super::fit::{Bench, Residuals, places};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict, summary};
+use super::fit::{Bench, Residuals};
+use super::intervals::{Intervals, intervals_of, numerics};
 use super::plant::{Model, Plant, Term};
-use super::search::{Scored, Search, Split, Trial, covariance, split};
-use super::tests::{ResidualTest, residual_tests};
+use super::search::{Scored, Search, Split, Trial, split};
+use super::tests::residual_tests;
 
 /// Joints per actuator that the search begins with, if the plant has so many: what finer ones change, re-tuned constants take up.
 const SEARCH_RESOLUTION: f64 = 10.0;
@@ -21,146 +20,6 @@ const LEFT_SHARE: f64 = 0.02;
 const NOTHING_NAMED: f64 = 0.5;
 /// Replacements are looked at again, at the full precision, if their χ² is above the best one's by no more than this.
 const NEAR_TIE: f64 = 500.0;
-/// χ² of one degree of freedom that noise exceeds in 5 % of cases.
-const CHI2_95: f64 = 3.841_458_820_694_124;
-
-/// What the data say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// The nominal model, finely enough discretised, explains the data to the noise.
-    None,
-    /// The causes are named.
-    Named,
-    /// Two or more causes that these data cannot tell apart.
-    Tied,
-    /// Structure is left that nothing in the library explains.
-    Unexplained,
-}
-
-/// A parameter of an adopted cause.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Estimate {
-    /// Its name in `[[effect]]` tables.
-    pub name: String,
-    /// The value.
-    pub value: f64,
-    /// Its unit.
-    pub unit: String,
-    /// The range that holds the true value in 95 % of cases; an end may be missing where the data say nothing.
-    pub ci95: [Option<f64>; 2],
-    /// Whether it stands at the end of its range.
-    pub at_bound: bool,
-}
-
-/// A cause that the data ask for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Adopted {
-    /// Its name.
-    pub id: String,
-    /// Where it acts.
-    pub kind: String,
-    /// What it is, in a sentence.
-    pub cause: String,
-    /// Its numbers.
-    pub parameters: Vec<Estimate>,
-    /// Causes that would do as well.
-    pub tied_with: Vec<String>,
-    /// Share of the held-out squared error above the noise that it removes.
-    pub gain_heldout: f64,
-    /// What is given of it: parameters that were not fitted.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub fixed: Vec<(String, f64)>,
-}
-
-/// Error of a model on one run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RunError {
-    /// The run.
-    pub id: String,
-    /// `fit` or `held-out`.
-    pub role: &'static str,
-    /// Root of the mean squared residual.
-    pub rmse_mm: f64,
-    /// The same in multiples of the noise.
-    pub rmse_noises: f64,
-}
-
-/// A model beside the data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Stage {
-    /// Over all runs.
-    pub rmse_mm: f64,
-    /// Over the held-out runs.
-    pub rmse_heldout_mm: f64,
-    /// The range of that, by leaving out held-out runs one at a time.
-    pub rmse_heldout_ci95_mm: [f64; 2],
-    /// Run by run.
-    pub runs: Vec<RunError>,
-    /// What the residuals look like.
-    pub residual_tests: Vec<ResidualTest>,
-    /// Fitted numbers.
-    pub parameters: Vec<Estimate>,
-}
-
-/// How well a candidate does on top of re-tuned constants.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Ranked {
-    /// The candidate.
-    pub id: String,
-    /// Error of the held-out runs with it.
-    pub rmse_heldout_mm: f64,
-    /// Change of Bayes's information criterion against re-tuned constants alone; negative is better.
-    pub delta_bic: f64,
-}
-
-/// Two constants that the data hardly tell apart.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Correlation {
-    /// The two, as cause and parameter.
-    pub between: [String; 2],
-    /// Coefficient of correlation (–).
-    pub coefficient: f64,
-}
-
-/// What was found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Diagnosis {
-    /// Of this object.
-    pub schema: u32,
-    /// The data's name.
-    pub dataset: String,
-    /// In a word.
-    pub verdict: Verdict,
-    /// In a sentence.
-    pub summary: String,
-    /// Every cause adopted, numerics and constants included.
-    pub effects: Vec<Adopted>,
-    /// Share of the squared error above the noise that is left of the refined nominal model's.
-    pub unexplained_fraction: f64,
-    /// What is left looks like this.
-    pub unexplained: Vec<String>,
-    /// One standard deviation, the mean over channels.
-    pub noise_mm: f64,
-    /// The nominal model.
-    pub baseline: Stage,
-    /// With re-tuned constants and refined discretisation.
-    pub calibrated: Stage,
-    /// With all causes adopted.
-    pub extended: Stage,
-    /// Candidates on top of re-tuned constants, best first.
-    pub candidates: Vec<Ranked>,
-    /// Constants that hardly differ in what they do.
-    pub correlations: Vec<Correlation>,
-    /// Ratio of the largest to the smallest eigenvalue of the scaled information of the extended model.
-    pub condition: f64,
-    /// What to measure to tell tied causes apart.
-    pub next_experiment: Option<String>,
-    /// What was noticed about the data.
-    pub data_quality: Vec<String>,
-    /// What was noticed about the analysis.
-    pub remarks: Vec<String>,
-}
 
 /// The diagnosis with the models behind it, for figures and for going on.
 pub struct Outcome {
@@ -211,46 +70,7 @@ pub fn diagnose(
         calibrated = search.calibrated(start)?;
     }
     let poor = poverty(plant, &search.split);
-    // Data that cannot tell causes apart get none.
-    let (mut best, trials) = if poor.is_some() {
-        (search.fitted(&Model { terms: Vec::new(), ..calibrated.model().clone() })?, Vec::new())
-    } else {
-        search.forward(calibrated.clone())?
-    };
-    let more = search.bench.leave_out_spikes(best.model())?;
-    if more > 0 {
-        best = search.settle(best)?;
-    }
-    best = search.resolve(best)?;
-    best = search.backward(best)?;
-    best = search.resolve(best)?;
-
-    // What could stand in the place of every cause.
-    let mut replaced: Vec<(usize, Trial)> = Vec::new();
-    for _ in 0..2 {
-        if poor.is_some() || best.model().terms.is_empty() {
-            break;
-        }
-        replaced = search.replacements(&best, 4)?;
-        let better = replaced
-            .iter()
-            .filter(|(_, trial)| {
-                let other = &trial.scored;
-                let simpler = other.freedom() < best.freedom() && search.is_tied(&best, other);
-                simpler || (other.total() < best.total() && !search.is_tied(other, &best))
-            })
-            .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
-            .map(|(_, trial)| trial.scored.clone());
-        let Some(better) = better else { break };
-        best = search.settle(better)?;
-        best = search.backward(best)?;
-    }
-    let coarse_total = best.total();
-    progress("the last digits");
-    best = search.fitted(&Model { fine: true, ..best.model().clone() })?;
-    best = search.resolve(best)?;
-    best = search.backward(best)?;
-    best = search.settle(best)?;
+    let Causes { mut best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, poor.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
     }
@@ -361,6 +181,64 @@ pub fn diagnose(
     })
 }
 
+/// What the search comes to.
+struct Causes {
+    /// The model with all causes that the data ask for, to the last digits.
+    best: Scored,
+    /// The candidates on top of re-tuned constants, best first.
+    trials: Vec<Trial>,
+    /// What could stand in the place of every cause.
+    replaced: Vec<(usize, Trial)>,
+    /// χ² of the best model before the last digits, beside which those were judged.
+    coarse_total: f64,
+    /// Single values that were left out.
+    spikes: usize,
+}
+
+/// Adds causes to re-tuned constants, takes out what is not needed, tries others in the place of each. Data that are too `poor` to tell causes apart
+/// get none.
+fn find(search: &mut Search, calibrated: &Scored, poor: bool) -> Result<Causes, String> {
+    let (mut best, trials) = if poor {
+        (search.fitted(&Model { terms: Vec::new(), ..calibrated.model().clone() })?, Vec::new())
+    } else {
+        search.forward(calibrated.clone())?
+    };
+    let spikes = search.bench.leave_out_spikes(best.model())?;
+    if spikes > 0 {
+        best = search.settle(best)?;
+    }
+    best = search.resolve(best)?;
+    best = search.backward(best)?;
+    best = search.resolve(best)?;
+
+    let mut replaced: Vec<(usize, Trial)> = Vec::new();
+    for _ in 0..2 {
+        if poor || best.model().terms.is_empty() {
+            break;
+        }
+        replaced = search.replacements(&best, 4)?;
+        let better = replaced
+            .iter()
+            .filter(|(_, trial)| {
+                let other = &trial.scored;
+                let simpler = other.freedom() < best.freedom() && search.is_tied(&best, other);
+                simpler || (other.total() < best.total() && !search.is_tied(other, &best))
+            })
+            .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
+            .map(|(_, trial)| trial.scored.clone());
+        let Some(better) = better else { break };
+        best = search.settle(better)?;
+        best = search.backward(best)?;
+    }
+    let coarse_total = best.total();
+    (search.progress)("the last digits");
+    best = search.fitted(&Model { fine: true, ..best.model().clone() })?;
+    best = search.resolve(best)?;
+    best = search.backward(best)?;
+    best = search.settle(best)?;
+    Ok(Causes { best, trials, replaced, coarse_total, spikes })
+}
+
 /// Why the data cannot decide, if so.
 fn poverty(plant: &dyn Plant, split: &Split) -> Option<String> {
     let signals = plant.signals();
@@ -379,104 +257,6 @@ fn poverty(plant: &dyn Plant, split: &Split) -> Option<String> {
         return Some("the voltage never changes: nothing can be told from these data but an offset".into());
     }
     None
-}
-
-/// Intervals of a model's coordinates and how they hang together.
-struct Intervals {
-    /// Per coordinate, in order: lower and upper end, in coordinates.
-    ends: Vec<[f64; 2]>,
-    /// Number of coordinates of each term.
-    sizes: Vec<usize>,
-    correlations: Vec<Correlation>,
-    condition: f64,
-}
-
-/// Half widths by the sandwich of information and of what the residuals' structure adds, checked by profiles: the coordinate is put to its end, all
-/// others are fitted again, and the end is moved to where χ² has grown by what 95 % asks for. `numerics`, what is not noise, is added in quadrature.
-fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -> Result<Intervals, String> {
-    let model = scored.model();
-    let places = places(model);
-    let n = places.len();
-    let naive = covariance(&scored.fit.information);
-    let inflation = search.bench.inflation(model, &search.split.fit, &naive)?;
-    let name = |k: usize| {
-        let (term, parameter) = places[k];
-        let candidate = &search.bench.plant.candidates()[model.terms[term].candidate];
-        format!("{} {}", candidate.id, candidate.parameters[parameter].name)
-    };
-    let (mut ends, mut correlations) = (Vec::new(), Vec::new());
-    for k in 0..n {
-        let free = &search.bench.plant.candidates()[model.terms[places[k].0].candidate].parameters[places[k].1];
-        let x = model.terms[places[k].0].x[places[k].1];
-        let spread = (naive[(k, k)] * inflation[k]).sqrt();
-        let mut sides = [x, x];
-        for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
-            let mut reach = CHI2_95.sqrt() * spread;
-            if n > 1 && reach.is_finite() && reach > 0.0 {
-                let to = (x + sign * reach).clamp(free.bounds[0], free.bounds[1]);
-                if (to - x).abs() > 0.5 * reach
-                    && let Ok(chi2) = search.bench.profile(model, places[k], to, &search.split.fit)
-                {
-                    let grown = (chi2 - scored.fit.chi2) / inflation[k];
-                    let asked = CHI2_95 * ((to - x) / reach).powi(2);
-                    if grown > 0.0 {
-                        reach *= (asked / grown).sqrt().clamp(0.5, 3.0);
-                    }
-                }
-            }
-            reach = reach.hypot(numerics.get(k).copied().unwrap_or(0.0));
-            sides[side] =
-                if reach.is_finite() { (x + sign * reach).clamp(free.bounds[0], free.bounds[1]) } else { free.bounds[side] };
-        }
-        ends.push(sides);
-        for j in 0..k {
-            let coefficient = naive[(k, j)] / (naive[(k, k)] * naive[(j, j)]).sqrt();
-            if coefficient.abs() > 0.95 {
-                correlations.push(Correlation { between: [name(j), name(k)], coefficient });
-            }
-        }
-    }
-    let sizes = model.terms.iter().map(|term| term.x.len()).collect();
-    Ok(Intervals { ends, sizes, correlations, condition: condition(&scored.fit.information) })
-}
-
-/// How far each coordinate moves with the discretisation, to the next coarser number of joints (if it was refined) and with the time step, and with constants that are
-/// nominal because the discretisation could do what they did.
-fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, String> {
-    let coordinates = |model: &Model| -> Vec<f64> { model.terms.iter().flat_map(|term| term.x.clone()).collect() };
-    let own = coordinates(best.model());
-    let ladder = search.bench.plant.resolutions();
-    let at = ladder.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
-    let mut moved = vec![0.0; own.len()];
-    let mut others = Vec::new();
-    if !own.is_empty() {
-        (search.progress)("how far the discretisation matters");
-        if at > 0 {
-            others.push(search.fitted(&Model { resolution: ladder[at - 1], ..best.model().clone() })?);
-        }
-        others.push(search.fitted(&Model { fine: false, ..best.model().clone() })?);
-        others.push(search.fitted(&search.with_constants(best.model()))?);
-    }
-    for other in &others {
-        for (moved, (a, b)) in moved.iter_mut().zip(own.iter().zip(coordinates(other.model()))) {
-            *moved = f64::hypot(*moved, a - b);
-        }
-    }
-    Ok(moved)
-}
-
-/// Condition of the information scaled to a unit diagonal.
-fn condition(information: &DMatrix<f64>) -> f64 {
-    let n = information.nrows();
-    if n == 0 {
-        return 1.0;
-    }
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        let by = (information[(i, i)] * information[(j, j)]).sqrt();
-        if by > 0.0 { information[(i, j)] / by } else { f64::from(u8::from(i == j)) }
-    });
-    let values = scaled.symmetric_eigenvalues();
-    values.max() / values.min().max(1e-16)
 }
 
 fn estimates(search: &Search, index: usize, term: &Term, found: &Intervals) -> Vec<Estimate> {
@@ -624,49 +404,5 @@ fn stage(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], scored: &Scored, 
         runs: runs.collect(),
         residual_tests: residual_tests(plant, split, &scored.residuals),
         parameters,
-    }
-}
-
-fn summary(verdict: Verdict, effects: &[Adopted], left: f64, poor: Option<&str>, resolution: f64, refined: bool) -> String {
-    let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
-    let name = |effect: &Adopted| {
-        let numbers: Vec<_> = effect
-            .parameters
-            .iter()
-            .map(|p| {
-                let range = match p.ci95 {
-                    [Some(low), Some(high)] if low == high => return format!("{} = {}", p.name, p.value),
-                    [Some(low), Some(high)] => format!(" ({low:.4} to {high:.4})"),
-                    _ => String::new(),
-                };
-                format!("{} = {:.4}{range}{}{}", p.name, p.value, if p.unit.is_empty() { "" } else { " " }, p.unit)
-            })
-            .collect();
-        format!("{} ({})", effect.id, numbers.join(", "))
-    };
-    let physics: Vec<&Adopted> = effects.iter().filter(|effect| effect.id != "discretisation").collect();
-    let names = physics.iter().map(|effect| name(effect)).collect::<Vec<_>>().join("; ");
-    match verdict {
-        Verdict::None => match poor {
-            Some(poor) => format!("Nothing stands out, but {poor}."),
-            None => format!("Nothing is missing: the nominal model{finely} explains the data to the noise."),
-        },
-        Verdict::Named => format!("The simulation lacks {names}."),
-        Verdict::Tied => {
-            let ties: Vec<_> = physics
-                .iter()
-                .filter(|effect| !effect.tied_with.is_empty())
-                .map(|effect| format!("{} cannot be told from {}", effect.id, effect.tied_with.join(", ")))
-                .collect();
-            format!("The simulation lacks {names}; in these data {}.", ties.join("; "))
-        }
-        Verdict::Unexplained => match (poor, physics.is_empty()) {
-            (Some(poor), _) => format!("The nominal model does not explain the data, and {poor}."),
-            (None, true) => "Something is wrong that nothing in the library explains.".into(),
-            (None, false) => format!(
-                "{names} explains a part, but {:.0} % of the misfit is left that nothing in the library explains.",
-                100.0 * left
-            ),
-        },
     }
 }
