@@ -111,7 +111,14 @@ pub struct PlanarEngine {
     law: Law,
     weight: f64,
     step: u64,
+    /// What was last asked for of the joints, but for the voltages, which are always those of [`prepare`](Engine::prepare).
     state: JointState,
+    /// The actuators' voltages of the last [`prepare`](Engine::prepare) (V).
+    voltages: Vec<f64>,
+    /// Whether the state is known to be numbers, because the changes of the last step were.
+    finite: bool,
+    /// Of the last step, for the books of energy.
+    turns: [f64; 2],
     /// Newton iterations so far, of all steps.
     iterations: u64,
     /// Energy that the weight of the step's end has taken so far (erg).
@@ -210,6 +217,9 @@ impl PlanarEngine {
             weight,
             step: 0,
             state: JointState { angles: joints(), rates: joints(), torques: joints(), motor_voltages: joints() },
+            voltages: Vec::with_capacity(robot.actuators),
+            finite: false,
+            turns: [0.0; 2],
             iterations: 0,
             numerical_loss: 0.0,
         })
@@ -356,6 +366,87 @@ impl PlanarEngine {
         Ok(())
     }
 
+    /// Sets the joints' voltages and rest angles, if the actuators' `voltages` are not those of the step before.
+    fn apply(&mut self, voltages: &[f64]) {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        if self.voltages.len() == voltages.len() && self.voltages.iter().zip(voltages).all(same) {
+            return;
+        }
+        self.voltages.clear();
+        self.voltages.extend_from_slice(voltages);
+        let m = self.motors_per_actuator;
+        let state = &mut self.state;
+        for (joints, volts) in state.motor_voltages.chunks_exact_mut(m).zip(voltages) {
+            joints.fill(volts / m as f64);
+        }
+        for (volts, gain) in state.motor_voltages.iter_mut().zip(&self.gains) {
+            *volts *= gain;
+        }
+        for (k, rung) in self.rungs.iter_mut().enumerate().skip(1) {
+            let (left, right) = joints_of(k, self.root);
+            let volts = |joint: Option<usize>| joint.and_then(|i| state.motor_voltages.get(i)).copied().unwrap_or(0.0);
+            // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
+            rung.volts = f64x2::new([volts(left), -volts(Some(right))]);
+            rung.rest_angle = f64x2::splat(self.joint.rest_angle_per_volt) * rung.volts;
+            if !self.rest_angles.is_empty() {
+                let rest = |joint: Option<usize>| joint.and_then(|i| self.rest_angles.get(i)).copied().unwrap_or(0.0);
+                rung.rest_angle += f64x2::new([rest(left), -rest(Some(right))]);
+            }
+        }
+    }
+
+    /// Reads the joints' angles and rates, and computes their torques.
+    fn read_joints(&mut self) {
+        let state = &mut self.state;
+        let lag = f64x2::splat(self.joint.damping_time);
+        let first = &self.rungs[0];
+        let mut inner = [first.angle, first.motion[0]].map(|value| f64x2::splat(value.to_array()[0]));
+        for (k, rung) in self.rungs.iter().enumerate().skip(1) {
+            let (left, right) = joints_of(k, self.root);
+            let (angle, rate) = (rung.angle - inner[0], rung.motion[0] - inner[1]);
+            inner = [rung.angle, rung.motion[0]];
+            let mut torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
+            if let Some(beyond) = &self.beyond {
+                torque -= beyond.now(k, rung, angle - rung.rest_angle, rate);
+            }
+            let [angle, rate, torque] = [angle, rate, torque].map(f64x2::to_array);
+            if let Some(i) = left {
+                (state.angles[i], state.rates[i], state.torques[i]) = (angle[0], rate[0], -torque[0]);
+            }
+            if right < state.angles.len() {
+                (state.angles[right], state.rates[right], state.torques[right]) = (-angle[1], -rate[1], torque[1]);
+            }
+        }
+    }
+
+    /// Fails if a coordinate is no number.
+    fn check_finite(&mut self) -> Result<(), EngineError> {
+        self.read_joints();
+        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !(a + r).is_finite());
+        if bad.is_none() && self.centre.iter().chain(&self.velocity).all(|value| value.is_finite()) {
+            self.finite = true;
+            return Ok(());
+        }
+        let what =
+            bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
+        let time = self.step as f64 * self.time_step;
+        Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: self.stable_step })
+    }
+
+    /// Sums of [`turns`](Engine::turns), from the left joint to the right one.
+    fn sum_turns(&mut self) {
+        let (mut work, mut squares) = (0.0, 0.0);
+        let mut add = |rung: &Rung, lane: usize| {
+            let [volts, turn] = [rung.volts, rung.turn].map(|lanes| lanes.as_array()[lane]);
+            work += volts * turn;
+            squares += turn * turn;
+        };
+        let Some((_, arms)) = self.rungs.split_first() else { return };
+        arms.iter().take(self.root).rev().for_each(|rung| add(rung, 0));
+        arms.iter().take(self.count - 1 - self.root).for_each(|rung| add(rung, 1));
+        self.turns = [work, squares];
+    }
+
     /// Sets the joints' parts of the step's right side: `share` (s) of their torques at the angles as they are.
     fn load_torques(&mut self, share: f64) {
         let share = f64x2::splat(-share);
@@ -380,6 +471,12 @@ fn pull(gravity: f64, slope: f64) -> [f64; 2] {
 /// Rung and lane of body `i` of a chain with this root.
 fn place(i: usize, root: usize) -> (usize, usize) {
     if i <= root { (root - i, 0) } else { (i - root, 1) }
+}
+
+/// The joints at the reference points of rung `k` of a chain with this root. That of the left arm's body is on its right, that of the right
+/// arm's, which may have ended, on its left.
+fn joints_of(k: usize, root: usize) -> (Option<usize>, usize) {
+    (root.checked_sub(k), root + k - 1)
 }
 
 fn put(lanes: &mut f64x2, lane: usize, value: f64) {
@@ -407,57 +504,12 @@ fn turned([x, z]: [f64x2; 2], by: f64x2) -> [f64x2; 2] {
 
 impl Engine for PlanarEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
-        let m = self.motors_per_actuator;
-        let state = &mut self.state;
-        for (joints, volts) in state.motor_voltages.chunks_exact_mut(m).zip(voltages) {
-            joints.fill(volts / m as f64);
-        }
-        for (volts, gain) in state.motor_voltages.iter_mut().zip(&self.gains) {
-            *volts *= gain;
-        }
-        let lag = f64x2::splat(self.joint.damping_time);
-        let first = &self.rungs[0];
-        let mut inner = [first.angle, first.motion[0]].map(|value| f64x2::splat(value.to_array()[0]));
-        let mut check = f64x2::ZERO;
-        for (k, rung) in self.rungs.iter_mut().enumerate().skip(1) {
-            // The joint of the left arm's body is on its right, that of the right arm's on its left.
-            let (left, right) = (self.root.checked_sub(k), self.root + k - 1);
-            let volts = |joint: Option<usize>| joint.and_then(|i| state.motor_voltages.get(i)).copied().unwrap_or(0.0);
-            // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
-            let per_volt = self.joint.rest_angle_per_volt;
-            rung.rest_angle = f64x2::new([per_volt * volts(left), -per_volt * volts(Some(right))]);
-            if !self.rest_angles.is_empty() {
-                let rest = |joint: Option<usize>| joint.and_then(|i| self.rest_angles.get(i)).copied().unwrap_or(0.0);
-                rung.rest_angle += f64x2::new([rest(left), -rest(Some(right))]);
-            }
-            let (angle, rate) = (rung.angle - inner[0], rung.motion[0] - inner[1]);
-            inner = [rung.angle, rung.motion[0]];
-            check += f64x2::ZERO * (angle + rate);
-            let mut torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
-            if let Some(beyond) = &self.beyond {
-                torque -= beyond.now(k, rung, angle - rung.rest_angle, rate);
-            }
-            let [angle, rate, torque] = [angle, rate, torque].map(f64x2::to_array);
-            if let Some(i) = left {
-                (state.angles[i], state.rates[i], state.torques[i]) = (angle[0], rate[0], -torque[0]);
-            }
-            if right < state.angles.len() {
-                (state.angles[right], state.rates[right], state.torques[right]) = (-angle[1], -rate[1], torque[1]);
-            }
-        }
-        let mut sum = check.reduce_add();
-        sum += 0.0 * (self.centre[0] + self.centre[1] + self.velocity[0] + self.velocity[1]);
-        if sum == 0.0 {
-            return Ok(());
-        }
-        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !(a + r).is_finite());
-        let what =
-            bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
-        let time = self.step as f64 * self.time_step;
-        Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: self.stable_step })
+        self.apply(voltages);
+        if self.finite { Ok(()) } else { self.check_finite() }
     }
 
-    fn joints(&self) -> &JointState {
+    fn joints(&mut self) -> &JointState {
+        self.read_joints();
         &self.state
     }
 
@@ -539,9 +591,16 @@ impl Engine for PlanarEngine {
         self.solve_step(share)?;
         let (step, per_weight) = (f64x2::splat(h), f64x2::splat(1.0 / self.weight));
         let (mut momentum, mut changed) = ([f64x2::ZERO; 2], f64x2::ZERO);
-        for rung in &mut self.rungs {
+        let mut inner = [f64x2::ZERO; 2];
+        for (k, rung) in self.rungs.iter_mut().enumerate() {
             let mean = rung.mean_of_centre();
+            let before = rung.angle;
             rung.angle += step * mean[0];
+            rung.turn = (rung.angle - inner[1]) - (before - inner[0]);
+            inner = [before, rung.angle];
+            if k == 0 {
+                inner = inner.map(|angle| f64x2::splat(angle.to_array()[0]));
+            }
             let change: Spatials = std::array::from_fn(|k| (mean[k] - rung.motion[k]) * per_weight);
             for (motion, change) in rung.motion.iter_mut().zip(change) {
                 *motion += change;
@@ -550,7 +609,9 @@ impl Engine for PlanarEngine {
             momentum[0] += rung.share * rung.motion[1];
             momentum[1] += rung.share * rung.motion[2];
         }
-        self.numerical_loss += (self.weight - 0.5) * changed.reduce_add();
+        let changed = changed.reduce_add();
+        self.finite = changed.is_finite();
+        self.numerical_loss += (self.weight - 0.5) * changed;
         if !self.clamped() {
             for (k, share) in momentum.into_iter().enumerate() {
                 let after = share.reduce_add();
@@ -558,8 +619,13 @@ impl Engine for PlanarEngine {
                 self.velocity[k] = after;
             }
         }
+        self.sum_turns();
         self.step += 1;
         Ok(())
+    }
+
+    fn turns(&self) -> [f64; 2] {
+        self.turns
     }
 
     fn midpoint(&self) -> bool {
@@ -621,6 +687,7 @@ impl Engine for PlanarEngine {
         if let Some(beyond) = &mut self.beyond {
             beyond.restore(memory);
         }
+        self.finite = false;
         self.step = step;
         Ok(())
     }

@@ -37,6 +37,9 @@ pub(super) struct Rung {
     pub(super) angle: f64x2,
     /// Rate (rad/s) and velocity of the centre of mass (cm/s).
     pub(super) motion: Spatials,
+    /// Voltage on the joint, negative on the right arm (V), and how far the joint turned in the last step (rad), both seen from the root.
+    pub(super) volts: f64x2,
+    pub(super) turn: f64x2,
     /// Angle at which the joint's spring is at rest, body towards the root to this one (rad).
     pub(super) rest_angle: f64x2,
     /// The angle that `along`, the direction from left end to right one, is of, and the other end less the reference point (cm).

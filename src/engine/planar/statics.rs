@@ -46,6 +46,7 @@ impl PlanarEngine {
             rung.motion = Default::default();
         }
         self.velocity = [0.0; 2];
+        self.finite = false;
         let settled = self.settle_in_steps(&dynamic);
         for (rung, real) in self.rungs.iter_mut().zip(&dynamic) {
             (rung.mass, rung.inertia, rung.implicit) = (real.mass, real.inertia, real.implicit);
