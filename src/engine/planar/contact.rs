@@ -60,7 +60,7 @@ impl Touch {
     }
 
     /// The corners of the lanes of the mask `these`; the others are open.
-    pub(super) fn of(self, these: f64x2) -> Self {
+    fn of(self, these: f64x2) -> Self {
         Self(self.0 & these)
     }
 
@@ -72,8 +72,8 @@ impl Touch {
         self.0.abs().simd_eq(f64x2::splat(2.0))
     }
 
-    pub(super) fn is_open(self) -> bool {
-        self.0.simd_eq(f64x2::ZERO).all()
+    fn is_open(self) -> bool {
+        !self.0.simd_ne(f64x2::ZERO).any()
     }
 
     /// As numbers for storing, of which none is negative.
@@ -116,8 +116,9 @@ impl Grip {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Corners {
     /// From the bodies' reference points (cm).
-    pub(super) arm: [f64x2; 2],
-    /// Mask of those that may touch; the others stay open.
+    arm: [f64x2; 2],
+    /// The last look at the floor that found one of them near, and the mask of those.
+    look: u64,
     near: f64x2,
     touch: Touch,
     /// Vertical velocity that has been taken off the target's end (cm/s).
@@ -138,10 +139,20 @@ fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
 }
 
 impl Corners {
-    /// Corners at `arm` from their bodies' reference points, `gap` (cm) above the floor, that move with `before` (cm/s): what mean velocity
-    /// stops them on the floor at the step's end. Those outside the mask `near` do not touch; the others were in the state `touch`.
+    pub(super) fn new(grip: Grip) -> Self {
+        Self { grip, ..Self::default() }
+    }
+
+    /// Changes the friction.
+    pub(super) fn set_grip(&mut self, grip: Grip) {
+        self.grip = grip;
+    }
+
+    /// Prepares those of the mask `near`, at `arm` from their bodies' reference points, `gap` (cm) above the floor, that move with `before`
+    /// (cm/s): what mean velocity stops them on the floor at the step's end. They go on in the states of the step before, if this was near
+    /// in the `look` before this one.
     #[inline(always)]
-    pub(super) fn new(near: f64x2, touch: Touch, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], grip: Grip, law: &Law) -> Self {
+    pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
         let weight = f64x2::splat(law.weight);
         let ahead = -gap / f64x2::splat(law.time_step);
         let end = if law.frictionless {
@@ -150,13 +161,18 @@ impl Corners {
             let out = (f64x2::splat(PUSH_OUT) * ahead).fast_min(f64x2::splat(PUSH_OUT_SPEED));
             gap.simd_gt(f64x2::ZERO).select(ahead, out)
         };
-        let target = [before[0] * (f64x2::ONE - weight), before[1] + weight * (end - before[1])];
-        Self { arm, near, touch: touch.of(near), grip, target, ..Self::default() }
+        self.touch = self.touch(look - 1).of(near);
+        self.look = look;
+        self.near = near;
+        self.arm = arm;
+        self.lift = f64x2::ZERO;
+        self.target = [before[0] * (f64x2::ONE - weight), before[1] + weight * (end - before[1])];
     }
 
-    /// Those whose states alone are known.
-    pub(super) fn restored(touch: Touch) -> Self {
-        Self { touch, ..Self::default() }
+    /// Takes stored states up again.
+    pub(super) fn restore(&mut self, touch: Touch, look: u64) {
+        (self.touch, self.look) = (touch, look);
+        self.impulse = [f64x2::ZERO; 2];
     }
 
     /// Lets corners that reach the floor in this step leave it with the share `restitution` of the speed they come with (cm/s).
@@ -184,13 +200,21 @@ impl Corners {
         a.max(b)
     }
 
-    pub(super) fn touch(&self) -> Touch {
-        self.touch
+    /// Whether neither touches, of corners near the floor.
+    pub(super) fn is_open(&self) -> bool {
+        self.touch.is_open()
     }
 
-    /// Impulse of the floor on one of them over the step (dyn·s).
-    pub(super) fn impulse(&self, lane: usize, law: &Law) -> [f64; 2] {
-        self.impulse.map(|part| part.to_array()[lane] / law.weight)
+    /// The states, in the time of a look.
+    pub(super) fn touch(&self, look: u64) -> Touch {
+        if self.look == look { self.touch } else { Touch::default() }
+    }
+
+    /// Arm (cm) and impulse of the floor over the step (dyn·s) of one of them, in the time of a look.
+    pub(super) fn of_body(&self, lane: usize, look: u64, law: &Law) -> [[f64; 2]; 2] {
+        let of = |part: f64x2| part.to_array()[lane];
+        let impulse = if self.look == look { self.impulse.map(of) } else { [0.0; 2] };
+        [self.arm.map(of), impulse.map(|part| part / law.weight)]
     }
 
     /// The law: states and impulses at the mean velocities `v`.
@@ -272,7 +296,7 @@ impl Corners {
     pub(super) fn agrees(&mut self, mean: &Spatials, law: &Law) -> bool {
         let (touch, impulse) = self.law(self.velocity_in(mean), law);
         self.impulse = impulse;
-        touch.0.simd_eq(self.touch.0).all()
+        !touch.0.simd_ne(self.touch.0).any()
     }
 
     /// Takes the bodies' motion `mean` as iterate.

@@ -7,30 +7,25 @@ use super::contact::{Corners, Grip, Law, Touch};
 use super::recursion::{Arms, Rung, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
-/// Corners of which one may touch in the step at hand.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Near {
-    /// Twice the rung, and 1 more at the bodies' other ends.
-    place: usize,
-    corners: Corners,
-}
-
-impl Near {
-    fn rung(&self) -> usize {
-        self.place / 2
-    }
-}
-
-/// The floor and the corners near it.
+/// The corners of all bodies. Those that may touch in the step at hand are listed.
 #[derive(Debug, Default)]
 pub(super) struct Floor {
+    /// Two places per rung: at the reference points, then at the other ends.
+    corners: Vec<Corners>,
     /// Of each rung.
     grips: Vec<Grip>,
     surface: Option<Surface>,
     half_thickness: f64,
-    /// Place after place, and those of the step before.
-    near: Vec<Near>,
-    before: Vec<Near>,
+    /// Places, in their order.
+    near: Vec<usize>,
+    /// How many times corners were looked for.
+    looks: u64,
+}
+
+/// Height of both reference points of a rung above the floor, with half a thickness (cm), and their velocity (cm/s).
+struct Reference {
+    gap: f64x2,
+    velocity: [f64x2; 2],
 }
 
 /// A floor that returns some of an impact, or whose friction depends on speed.
@@ -59,60 +54,58 @@ impl Surface {
 impl Floor {
     /// Corners with the coefficients of friction of both bodies of each rung, under boxes of twice `half_thickness` (cm).
     pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
-        let places = 2 * frictions.len();
-        Self {
-            grips: frictions.iter().map(|pair| Grip::new(f64x2::new(*pair))).collect(),
-            surface,
-            half_thickness,
-            near: Vec::with_capacity(places),
-            before: Vec::with_capacity(places),
-        }
+        let grips: Vec<Grip> = frictions.iter().map(|pair| Grip::new(f64x2::new(*pair))).collect();
+        let corners: Vec<Corners> = grips.iter().flat_map(|grip| [Corners::new(*grip); 2]).collect();
+        Self { near: Vec::with_capacity(corners.len()), corners, grips, surface, half_thickness, looks: 0 }
     }
 
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
     /// moving with `velocity` (cm/s); whether any does. Lanes without mass have no corners.
     pub(super) fn find(&mut self, rungs: &[Rung], height: f64, velocity: [f64; 2], law: &Law) -> bool {
-        std::mem::swap(&mut self.near, &mut self.before);
         self.near.clear();
-        let mut before = self.before.iter().peekable();
+        self.looks += 1;
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
-        let mut at = f64x2::splat(height + self.half_thickness);
-        let mut moving = velocity.map(f64x2::splat);
-        for (k, (rung, grip)) in rungs.iter().zip(&self.grips).enumerate() {
+        let mut from = Reference { gap: f64x2::splat(height + self.half_thickness), velocity: velocity.map(f64x2::splat) };
+        for (k, rung) in rungs.iter().enumerate() {
             let rate = rung.motion[0];
             // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
             let down = half.copysign(rung.along[0]);
-            let offset = [down * rung.along[1], -down * rung.along[0]];
-            for end in 0..2 {
-                let arm = if end == 0 { offset } else { [rung.across[0] + offset[0], rung.across[1] + offset[1]] };
-                let gap = at + arm[1];
-                let vertical = moving[1] + rate * arm[0];
-                let near = gap.simd_lt(reach - step * vertical) & rung.mass.simd_gt(f64x2::ZERO);
-                if !near.any() {
-                    continue;
-                }
-                let place = 2 * k + end;
-                while before.next_if(|before| before.place < place).is_some() {}
-                let touch =
-                    before.next_if(|before| before.place == place).map_or_else(Touch::default, |before| before.corners.touch());
-                let velocity = [moving[0] - rate * arm[1], vertical];
-                let corners = match &self.surface {
-                    None => Corners::new(near, touch, arm, gap, velocity, *grip, law),
-                    Some(surface) => {
-                        let grip = surface.grip(*grip, velocity[0]);
-                        let mut corners = Corners::new(near, touch, arm, gap, velocity, grip, law);
-                        corners.bounce(gap, vertical, surface.restitution, law);
-                        corners
-                    }
-                };
-                self.near.push(Near { place, corners });
+            let inner = [down * rung.along[1], -down * rung.along[0]];
+            let outer = [rung.across[0] + inner[0], rung.across[1] + inner[1]];
+            let reaches = |arm: [f64x2; 2]| (from.gap + arm[1]).simd_lt(reach - step * (from.velocity[1] + rate * arm[0]));
+            let (inner_near, outer_near) = (reaches(inner), reaches(outer));
+            if inner_near.any() {
+                self.place(2 * k, inner_near, inner, rung, &from, law);
             }
-            at = next(at, rung.across[1], k);
-            moving = [next(moving[0], -rate * rung.across[1], k), next(moving[1], rate * rung.across[0], k)];
+            if outer_near.any() {
+                self.place(2 * k + 1, outer_near, outer, rung, &from, law);
+            }
+            let [x, z] = rung.across;
+            from.gap = next(from.gap, z, k);
+            from.velocity = [next(from.velocity[0], -rate * z, k), next(from.velocity[1], rate * x, k)];
         }
         !self.near.is_empty()
+    }
+
+    /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.
+    #[inline(never)]
+    fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], rung: &Rung, from: &Reference, law: &Law) {
+        let near = near & rung.mass.simd_gt(f64x2::ZERO);
+        if !near.any() {
+            return;
+        }
+        let rate = rung.motion[0];
+        let gap = from.gap + arm[1];
+        let velocity = [from.velocity[0] - rate * arm[1], from.velocity[1] + rate * arm[0]];
+        let corners = &mut self.corners[place];
+        corners.place(self.looks, near, arm, gap, velocity, law);
+        if let Some(surface) = &self.surface {
+            corners.set_grip(surface.grip(self.grips[place / 2], velocity[0]));
+            corners.bounce(gap, velocity[1], surface.restitution, law);
+        }
+        self.near.push(place);
     }
 
     /// Force per sliding speed and link on the floor (dyn·s/cm).
@@ -144,82 +137,87 @@ impl Floor {
         }
     }
 
-    /// The corners that may touch, rung after rung.
-    pub(super) fn corners(&self) -> &[Near] {
-        &self.near
+    /// The corners that may touch, for the walk to the root.
+    pub(super) fn inwards(&self) -> Inwards<'_> {
+        Inwards { corners: &self.corners, near: &self.near }
     }
 
     /// Calls `each` with all near corners and the mean motions of their bodies.
     #[inline(always)]
     pub(super) fn near(&mut self, rungs: &[Rung], mut each: impl FnMut(&mut Corners, &Spatials)) {
-        for near in &mut self.near {
-            let mean = &rungs[near.rung()].mean;
-            each(&mut near.corners, mean);
+        for &place in &self.near {
+            each(&mut self.corners[place], &rungs[place / 2].mean);
         }
     }
 
     /// The sums of `of` over the near corners, one after the other.
     #[inline(always)]
     pub(super) fn sum(&self, of: impl Fn(&Corners) -> [f64x2; 2]) -> [f64; 2] {
-        self.near.iter().fold([0.0; 2], |sum, near| {
-            let [a, b] = of(&near.corners).map(f64x2::to_array);
+        self.near.iter().fold([0.0; 2], |sum, &place| {
+            let [a, b] = of(&self.corners[place]).map(f64x2::to_array);
             [sum[0] + a[0] + a[1], sum[1] + b[0] + b[1]]
         })
     }
 
-    /// Arm (cm) and impulse (dyn·s) of the near corners of one body: at its reference point and at its other end.
-    pub(super) fn of_body(&self, rung: usize, lane: usize, law: &Law) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let first = self.near.partition_point(|near| near.rung() < rung);
-        let of_rung = self.near[first..].iter().take_while(move |near| near.rung() == rung);
-        of_rung.map(move |near| [near.corners.arm.map(|part| part.to_array()[lane]), near.corners.impulse(lane, law)])
+    /// Arm (cm) and impulse (dyn·s) of the corners of one body: at its reference point and at its other end.
+    pub(super) fn of_body(&self, rung: usize, lane: usize, law: &Law) -> [[[f64; 2]; 2]; 2] {
+        [0, 1].map(|end| self.corners[2 * rung + end].of_body(lane, self.looks, law))
     }
 
     /// Sets friction to zero, or back to what it is.
     pub(super) fn swap_grips(&mut self, other: &mut Vec<Grip>) {
         std::mem::swap(&mut self.grips, other);
+        for (place, corners) in self.corners.iter_mut().enumerate() {
+            corners.set_grip(self.grips[place / 2]);
+        }
     }
 
     /// Forgets all contact.
     pub(super) fn clear(&mut self) {
         self.near.clear();
+        self.looks += 1;
     }
 
     /// The states of all corners as numbers for storing: four per rung, at the reference points and at the other ends.
-    pub(super) fn saved(&self) -> Vec<f64> {
-        let mut states = vec![Touch::default().saved(); 2 * self.grips.len()];
-        for near in &self.near {
-            states[near.place] = near.corners.touch().saved();
-        }
-        states.into_iter().flatten().collect()
+    pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
+        self.corners.iter().flat_map(|corners| corners.touch(self.looks).saved())
     }
 
-    /// Takes the states up again: all but the open ones were near.
+    /// Takes the states up again.
     pub(super) fn restore(&mut self, saved: &[f64]) {
-        let touches = saved.chunks_exact(2).map(|pair| Touch::restored([pair[0], pair[1]]));
-        let touching = touches.enumerate().filter(|(_, touch)| !touch.is_open());
-        self.near.clear();
-        self.near.extend(touching.map(|(place, touch)| Near { place, corners: Corners::restored(touch) }));
+        for (corners, saved) in self.corners.iter_mut().zip(saved.as_chunks().0) {
+            corners.restore(Touch::restored(*saved), self.looks);
+        }
     }
 }
 
-/// Takes the corners of `rung`, which are the last ones of `near`, off that, and returns what they add to the inertia and force of its bodies;
-/// none if all are open.
-#[inline(always)]
-pub(super) fn take_last(near: &mut &[Near], rung: usize, law: &Law) -> Option<Arms> {
-    if near.last().is_none_or(|last| last.rung() != rung) {
-        return None;
-    }
-    let (mut bodies, mut touch) = (Arms::default(), false);
-    while let [rest @ .., last] = *near
-        && last.rung() == rung
-    {
-        *near = rest;
-        if !last.corners.touch().is_open() {
-            last.corners.add_to(&mut bodies, law);
-            touch = true;
+/// The corners that may touch, to be taken from the tips to the root.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Inwards<'a> {
+    corners: &'a [Corners],
+    near: &'a [usize],
+}
+
+impl Inwards<'_> {
+    /// Takes those of `rung` off the end and returns what they add to the inertia and force of its bodies; none if all are open.
+    #[inline(always)]
+    pub(super) fn take(&mut self, rung: usize, law: &Law) -> Option<Arms> {
+        if self.near.last().is_none_or(|place| place / 2 != rung) {
+            return None;
         }
+        let (mut bodies, mut touch) = (Arms::default(), false);
+        while let [rest @ .., place] = self.near
+            && place / 2 == rung
+        {
+            self.near = rest;
+            let corners = &self.corners[*place];
+            if !corners.is_open() {
+                corners.add_to(&mut bodies, law);
+                touch = true;
+            }
+        }
+        touch.then_some(bodies)
     }
-    touch.then_some(bodies)
 }
 
 /// From a rung's reference points to the next one's: along each arm; from the root, lane 0 stays and lane 1 goes to the root's other end.

@@ -49,7 +49,7 @@ use wide::f64x2;
 pub(super) use self::beyond::GAUSS;
 use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
-use self::floor::{Floor, Surface, next};
+use self::floor::{Floor, Inwards, Surface, next};
 use self::recursion::{Hold, Rung, Spatials, direction, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -367,7 +367,7 @@ impl PlanarEngine {
     fn solve_once(&mut self) -> Result<(), EngineError> {
         let law = self.law;
         if !self.solve_on_floor(&law)? {
-            solve(&mut self.rungs, self.hold, &[], &law);
+            solve(&mut self.rungs, self.hold, Inwards::default(), &law);
         }
         Ok(())
     }

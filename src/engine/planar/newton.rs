@@ -72,7 +72,7 @@ impl PlanarEngine {
         let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
         for iteration in 1..=largest {
             self.iterations += 1;
-            solve(&mut self.rungs, Hold::Free, floor.corners(), law);
+            solve(&mut self.rungs, Hold::Free, floor.inwards(), law);
             let mut agrees = true;
             floor.near(&self.rungs, |corners, mean| agrees &= corners.agrees(mean, law));
             if agrees {

@@ -10,7 +10,7 @@
 use wide::f64x2;
 
 use super::contact::Law;
-use super::floor::{Near, take_last};
+use super::floor::Inwards;
 
 /// Turn, x, z.
 type Spatial = [f64; 3];
@@ -212,10 +212,8 @@ impl Arms {
     /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
     fn at_root(&self, root: &Rung) -> Articulated {
         let lane = |value: f64x2, lane: usize| value.as_array()[lane];
-        let mut right = Self {
-            inertia: self.inertia.map(|value| f64x2::splat(lane(value, 1))),
-            force: self.force.map(|value| f64x2::splat(lane(value, 1))),
-        };
+        let mut right = *self;
+        right.inertia.iter_mut().chain(&mut right.force).for_each(|value| *value = f64x2::splat(lane(*value, 1)));
         right.take(root);
         let both = |left: f64x2, right: f64x2| lane(left, 0) + lane(right, 0);
         Articulated {
@@ -253,16 +251,18 @@ pub(super) enum Hold {
     Hinged,
 }
 
-/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. The corners `near` the floor touch
-/// it as their states say.
-pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut near: &[Near], law: &Law) {
+/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as
+/// their states say.
+pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut floor: Inwards, law: &Law) {
     let Some((root, arms)) = rungs.split_first_mut() else { return };
     let mut chain = Arms::default();
-    for (k, rung) in arms.iter_mut().enumerate().rev() {
+    let mut k = arms.len();
+    for rung in arms.iter_mut().rev() {
         chain.take(rung);
-        if let Some(by) = take_last(&mut near, k + 1, law) {
+        if let Some(by) = floor.take(k, law) {
             chain.touch(&by);
         }
+        k -= 1;
         chain.through_joints(rung);
     }
     let motion = if hold == Hold::Clamped {
@@ -273,7 +273,7 @@ pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut near: &[Near], law: &Law
         [(whole.force[0] + torque) / (whole.inertia[0] + implicit), 0.0, 0.0]
     } else {
         let mut whole = chain.at_root(root);
-        if let Some(by) = take_last(&mut near, 0, law) {
+        if let Some(by) = floor.take(0, law) {
             (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
             (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
         }

@@ -8,7 +8,7 @@
 use wide::f64x2;
 
 use super::contact::{Grip, Law};
-use super::floor::Floor;
+use super::floor::{Floor, Inwards};
 use super::recursion::{Rung, direction, solve};
 use super::{Engine, EngineError, PlanarEngine, outwards};
 use crate::model::Mount;
@@ -85,7 +85,7 @@ impl PlanarEngine {
                 }
             }
             if !self.solve_on_floor(&law)? {
-                solve(&mut self.rungs, self.hold, &[], &law);
+                solve(&mut self.rungs, self.hold, Inwards::default(), &law);
             }
             let turns = self.rungs.iter().flat_map(|rung| rung.mean[0].to_array());
             let largest = turns.map(f64::abs).fold(0.0, f64::max);
