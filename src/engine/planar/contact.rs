@@ -121,6 +121,8 @@ pub(super) struct Corners {
     look: u64,
     near: f64x2,
     touch: Touch,
+    /// The states that the newest solution asks for.
+    asked: Touch,
     /// Vertical velocity that has been taken off the target's end (cm/s).
     lift: f64x2,
     grip: Grip,
@@ -294,15 +296,15 @@ impl Corners {
     /// Whether the bodies' motion `mean` asks for the states that it was solved with; the impulses belong to it then.
     #[inline(always)]
     pub(super) fn agrees(&mut self, mean: &Spatials, law: &Law) -> bool {
-        let (touch, impulse) = self.law(self.velocity_in(mean), law);
-        self.impulse = impulse;
-        !touch.0.simd_ne(self.touch.0).any()
+        (self.asked, self.impulse) = self.law(self.velocity_in(mean), law);
+        !self.asked.0.simd_ne(self.touch.0).any()
     }
 
-    /// Takes the bodies' motion `mean` as iterate.
-    pub(super) fn accept(&mut self, mean: &Spatials, law: &Law) {
+    /// Takes the bodies' motion `mean`, which has just been asked whether it [`agrees`](Self::agrees), as iterate.
+    #[inline(always)]
+    pub(super) fn accept(&mut self, mean: &Spatials) {
         self.velocity = self.velocity_in(mean);
-        (self.touch, self.impulse) = self.law(self.velocity, law);
+        self.touch = self.asked;
     }
 
     /// Prepares a search from the iterate to `mean`; returns impulse·step at the iterate as the piece extends it to the end.

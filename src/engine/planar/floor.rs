@@ -67,24 +67,24 @@ impl Floor {
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
-        let mut from = Reference { gap: f64x2::splat(height + self.half_thickness), velocity: velocity.map(f64x2::splat) };
+        let mut at = f64x2::splat(height + self.half_thickness);
+        let mut moving = velocity.map(f64x2::splat);
         for (k, rung) in rungs.iter().enumerate() {
-            let rate = rung.motion[0];
+            let (rate, across) = (rung.motion[0], rung.across);
             // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
             let down = half.copysign(rung.along[0]);
-            let inner = [down * rung.along[1], -down * rung.along[0]];
-            let outer = [rung.across[0] + inner[0], rung.across[1] + inner[1]];
-            let reaches = |arm: [f64x2; 2]| (from.gap + arm[1]).simd_lt(reach - step * (from.velocity[1] + rate * arm[0]));
-            let (inner_near, outer_near) = (reaches(inner), reaches(outer));
-            if inner_near.any() {
-                self.place(2 * k, inner_near, inner, rung, &from, law);
+            let (x, z) = (down * rung.along[1], -down * rung.along[0]);
+            let (outer_x, outer_z) = (across[0] + x, across[1] + z);
+            let near = |x: f64x2, z: f64x2| (at + z).simd_lt(reach - step * (moving[1] + rate * x));
+            let (inner, outer) = (near(x, z), near(outer_x, outer_z));
+            if (inner | outer).any() {
+                // Most rungs are not: what only these need is made here.
+                let from = Reference { gap: at, velocity: moving };
+                self.place(2 * k, inner, [x, z], rung, &from, law);
+                self.place(2 * k + 1, outer, [outer_x, outer_z], rung, &from, law);
             }
-            if outer_near.any() {
-                self.place(2 * k + 1, outer_near, outer, rung, &from, law);
-            }
-            let [x, z] = rung.across;
-            from.gap = next(from.gap, z, k);
-            from.velocity = [next(from.velocity[0], -rate * z, k), next(from.velocity[1], rate * x, k)];
+            at = next(at, across[1], k);
+            moving = [next(moving[0], -rate * across[1], k), next(moving[1], rate * across[0], k)];
         }
         !self.near.is_empty()
     }
@@ -99,13 +99,20 @@ impl Floor {
         let rate = rung.motion[0];
         let gap = from.gap + arm[1];
         let velocity = [from.velocity[0] - rate * arm[1], from.velocity[1] + rate * arm[0]];
-        let corners = &mut self.corners[place];
-        corners.place(self.looks, near, arm, gap, velocity, law);
-        if let Some(surface) = &self.surface {
-            corners.set_grip(surface.grip(self.grips[place / 2], velocity[0]));
-            corners.bounce(gap, velocity[1], surface.restitution, law);
+        self.corners[place].place(self.looks, near, arm, gap, velocity, law);
+        if self.surface.is_some() {
+            self.feel_surface(place, gap, velocity, law);
         }
         self.near.push(place);
+    }
+
+    /// Prepares corners for a floor that is not plain.
+    #[inline(never)]
+    fn feel_surface(&mut self, place: usize, gap: f64x2, velocity: [f64x2; 2], law: &Law) {
+        let Some(surface) = &self.surface else { return };
+        let corners = &mut self.corners[place];
+        corners.set_grip(surface.grip(self.grips[place / 2], velocity[0]));
+        corners.bounce(gap, velocity[1], surface.restitution, law);
     }
 
     /// Force per sliding speed and link on the floor (dyn·s/cm).

@@ -83,7 +83,7 @@ impl PlanarEngine {
                 Search::Part => {}
                 Search::Whole => {
                     // After the first solution: its states were a guess, and any motion will do for an iterate.
-                    floor.near(&self.rungs, |corners, mean| corners.accept(mean, law));
+                    floor.near(&self.rungs, |corners, mean| corners.accept(mean));
                     for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
                         *iterate = rung.mean;
                     }
