@@ -1,6 +1,7 @@
 //! The loop over steps allocates nothing, on either engine; what Bullet does inside is its own.
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use sfers::drive::Means;
 use sfers::experiment::{self, Source, presets};
 
 #[global_allocator]
@@ -15,13 +16,13 @@ fn steps_allocate_nothing() {
             let experiment = experiment::experiment(&source).unwrap();
             let mut robot = experiment.engine().unwrap();
             let mut voltages = vec![0.0; experiment.robot.actuators];
-            let mut start = voltages.clone();
+            let mut means = Means::new(&experiment.drive, experiment.robot.actuators, 0.0);
             let nodes = 3 * (experiment.robot.joints() + 2);
             let (mut positions, mut velocities) = (vec![0.0; nodes], vec![0.0; nodes]);
             let mut steps = |count: u64| {
                 for _ in 0..count {
                     let time = robot.step() as f64 * experiment.time_step;
-                    experiment.drive.mean(time, time + experiment.time_step, &mut start, &mut voltages);
+                    means.over(time, time + experiment.time_step, &mut voltages);
                     robot.prepare(&voltages).unwrap();
                     robot.nodes(&mut positions, &mut velocities).unwrap();
                     robot.advance().unwrap();

@@ -7,7 +7,7 @@ use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
 use super::quality;
 use super::voltage::Command;
 use crate::analytic;
-use crate::drive::{Drive, Table, Waveform};
+use crate::drive::{Drive, Means, Table, Waveform};
 use crate::effects::{self, Applied, EFFECTS, Kind, Parameter, Path, View};
 use crate::engine::{Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::experiment::hermite;
@@ -447,9 +447,9 @@ fn track_from(
     let mut engine = build(robot)?;
     engine.set_friction_model(FrictionModel::Coulomb);
     let n = robot.actuators;
-    let mut start = vec![0.0; n];
-    drive.voltages(0.0, &mut start);
-    let mut volts = start.clone();
+    let mut means = Means::new(drive, n, 0.0);
+    let mut volts = vec![0.0; n];
+    drive.voltages(0.0, &mut volts);
     path.settle(&mut volts);
     if hung > 0.0 {
         let mut loaded = robot.clone();
@@ -508,13 +508,13 @@ fn track_from(
             }
         }
         if parts == 1 {
-            drive.mean(from, to, &mut start, &mut volts);
+            means.over(from, to, &mut volts);
             path.pass(h, &mut volts);
         } else {
             volts.fill(0.0);
             for part in 0..parts {
                 let [a, b] = [part, part + 1].map(|k| from + h * k as f64 / parts as f64);
-                drive.mean(a, b, &mut start, &mut piece);
+                means.over(a, b, &mut piece);
                 path.pass(h / parts as f64, &mut piece);
                 volts.iter_mut().zip(&piece).for_each(|(sum, v)| *sum += v / parts as f64);
             }

@@ -209,12 +209,30 @@ pub fn find(name: &str) -> Option<&'static Gait> {
 impl Gait {
     /// The actuators that are on at time `t` (s), for a period or parameter `p` (s), as a mask of `0` and `1`.
     pub fn mask(&self, t: f64, p: f64) -> &'static str {
-        let (once, p_once) = if p < 0.0 { (self.once_if_negative, p.abs()) } else { (self.once, p) };
+        let (once, p_once) = self.once(p);
         let phase =
             |phases: &'static [Phase], t: f64, p: f64| phases.iter().find(|(bound, _)| t < bound.time(p)).map(|&(_, mask)| mask);
         phase(once, t, p_once)
             .or_else(|| if self.cycle.is_empty() { None } else { phase(self.cycle, t % p, p) })
             .unwrap_or("00000")
+    }
+
+    /// When the phase of time `t` (s) ends, but for rounding.
+    pub(super) fn phase_end(&self, t: f64, p: f64) -> f64 {
+        let (once, p_once) = self.once(p);
+        let end = |phases: &[Phase], t: f64, p: f64| phases.iter().map(|(bound, _)| bound.time(p)).find(|end| t < *end);
+        end(once, t, p_once).unwrap_or_else(|| {
+            if self.cycle.is_empty() {
+                return f64::INFINITY;
+            }
+            let within = t % p;
+            t + (end(self.cycle, within, p).unwrap_or(p).min(p) - within)
+        })
+    }
+
+    /// The phases that are passed once, and the number that they take.
+    fn once(&self, p: f64) -> (&'static [Phase], f64) {
+        if p < 0.0 { (self.once_if_negative, p.abs()) } else { (self.once, p) }
     }
 }
 

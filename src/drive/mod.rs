@@ -11,6 +11,9 @@ pub use table::Table;
 
 use std::f64::consts::PI;
 
+/// Share of a time that sums of a few times err by at most.
+const ROUNDING: f64 = 1e-12;
+
 /// A voltage waveform for all actuators.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Waveform {
@@ -107,35 +110,23 @@ impl Drive {
         !matches!(self.waveform, Waveform::Sine { .. } | Waveform::Table(_))
     }
 
-    /// Mean voltages (V) from `from` to `to` (s) into `out`: a jump within counts from its moment on, what changes smoothly is taken at the
-    /// middle, and a table's lines are integrated. `start` holds the voltages at `from` and takes those at `to`, for the next stretch.
-    pub fn mean(&self, from: f64, to: f64, start: &mut [f64], out: &mut [f64]) {
-        if let (Waveform::Table(table), true) = (&self.waveform, self.positive_gain == 1.0) {
-            // Exact, also where a table jumps.
-            return table.mean(from - self.delay, to - self.delay, out);
-        }
-        if !self.jumps() {
-            return self.voltages(0.5 * (from + to), out);
-        }
-        self.voltages(to, out);
-        let Some(first) = out.iter().zip(&*start).position(|(end, start)| end != start) else { return };
-        // The jump lies between `before` and `after`.
-        let (mut before, mut after) = (from, to);
-        loop {
-            let middle = 0.5 * (before + after);
-            if middle <= before || middle >= after {
-                break;
+    /// A time (s) up to which the voltages are those at `t`: their next jump, but for what rounding may move it by.
+    fn holds_until(&self, t: f64) -> f64 {
+        let t = if self.delay == 0.0 { t } else { (t - self.delay).max(0.0) };
+        let jump = match &self.waveform {
+            Waveform::Gait { gait, parameter, .. } => gait.phase_end(t, *parameter),
+            Waveform::Dc(_) => f64::INFINITY,
+            Waveform::Step { at, .. } if t < *at => *at,
+            Waveform::Step { .. } => f64::INFINITY,
+            Waveform::Sequence { period, phases } => {
+                let period = period.unwrap_or(f64::INFINITY);
+                let within = t % period;
+                let end = phases.iter().map(|(until, _)| *until).find(|until| within < *until);
+                t + (end.unwrap_or(f64::INFINITY).min(period) - within)
             }
-            self.voltages(middle, out);
-            if out[first] == start[first] { before = middle } else { after = middle }
-        }
-        self.voltages(to, out);
-        let share = (after - from) / (to - from);
-        for (out, start) in out.iter_mut().zip(start) {
-            let end = *out;
-            *out = share * *start + (1.0 - share) * end;
-            *start = end;
-        }
+            Waveform::Sine { .. } | Waveform::Table(_) => t,
+        };
+        (jump + self.delay) * (1.0 - ROUNDING)
     }
 
     /// The period of the waveform (s), if it repeats.
@@ -149,6 +140,62 @@ impl Drive {
     }
 }
 
+/// The mean voltages of a drive over stretches of time that follow on each other.
+#[derive(Debug, Clone)]
+pub struct Means<'a> {
+    drive: &'a Drive,
+    /// Voltages at the start of the coming stretch (V), and until when (s) they hold.
+    start: Vec<f64>,
+    until: f64,
+}
+
+impl<'a> Means<'a> {
+    /// Of `drive` for so many actuators, from the time `start` (s) on.
+    pub fn new(drive: &'a Drive, actuators: usize, start: f64) -> Self {
+        let mut voltages = vec![0.0; actuators];
+        drive.voltages(start, &mut voltages);
+        Self { drive, start: voltages, until: drive.holds_until(start) }
+    }
+
+    /// Mean voltages (V) from `from` to `to` (s) into `out`: a jump within counts from its moment on, what changes smoothly is taken at the
+    /// middle, and a table's lines are integrated.
+    pub fn over(&mut self, from: f64, to: f64, out: &mut [f64]) {
+        let drive = self.drive;
+        if to < self.until {
+            return out.copy_from_slice(&self.start);
+        }
+        if let (Waveform::Table(table), true) = (&drive.waveform, drive.positive_gain == 1.0) {
+            // Exact, also where a table jumps.
+            return table.mean(from - drive.delay, to - drive.delay, out);
+        }
+        if !drive.jumps() {
+            return drive.voltages(0.5 * (from + to), out);
+        }
+        drive.voltages(to, out);
+        self.until = drive.holds_until(to);
+        let Some(first) = out.iter().zip(&self.start).position(|(end, start)| end != start) else {
+            return self.start.copy_from_slice(out);
+        };
+        // The jump lies between `before` and `after`.
+        let (mut before, mut after) = (from, to);
+        loop {
+            let middle = 0.5 * (before + after);
+            if middle <= before || middle >= after {
+                break;
+            }
+            drive.voltages(middle, out);
+            if out[first] == self.start[first] { before = middle } else { after = middle }
+        }
+        drive.voltages(to, out);
+        let share = (after - from) / (to - from);
+        for (out, start) in out.iter_mut().zip(&mut self.start) {
+            let end = *out;
+            *out = share * *start + (1.0 - share) * end;
+            *start = end;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,17 +204,43 @@ mod tests {
     fn the_mean_over_a_step_counts_a_jump_from_its_moment_on() {
         let drive =
             Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0, delay: 0.0 };
-        let (mut start, mut mean) = (vec![0.0; 2], vec![f64::NAN; 2]);
-        drive.mean(0.0, 0.1, &mut start, &mut mean);
+        let (mut means, mut mean) = (Means::new(&drive, 2, 0.0), vec![f64::NAN; 2]);
+        means.over(0.0, 0.1, &mut mean);
         assert_eq!(mean, [0.0, 0.0]);
-        drive.mean(0.1, 0.5, &mut start, &mut mean);
+        means.over(0.1, 0.5, &mut mean);
         assert!((mean[0] + 500.0).abs() < 1e-9 && (mean[1] - 300.0).abs() < 1e-9, "{mean:?}");
-        assert_eq!(start, [-1000.0, 600.0]);
-        drive.mean(0.5, 0.6, &mut start, &mut mean);
-        assert_eq!(mean, start);
+        means.over(0.5, 0.6, &mut mean);
+        assert_eq!(mean, [-1000.0, 600.0]);
         let sine = Drive { waveform: Waveform::Sine { amplitudes: vec![-2.0], frequency: 1.0 }, positive_gain: 1.0, delay: 0.0 };
-        sine.mean(0.2, 0.3, &mut [0.0], &mut mean[..1]);
+        Means::new(&sine, 1, 0.2).over(0.2, 0.3, &mut mean[..1]);
         assert!((mean[0] + 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn voltages_hold_until_just_before_their_next_jump() {
+        let sequence = |period| Waveform::Sequence { period, phases: vec![(0.03, vec![1.0; 5]), (0.1, vec![2.0; 5])] };
+        let gaits = gait::GAITS.iter().flat_map(|gait| {
+            let negative = (!gait.once_if_negative.is_empty()).then_some(-0.02);
+            let parameters = [0.07].into_iter().chain(negative);
+            parameters.map(move |parameter| Waveform::Gait { gait, parameter, on_voltages: vec![-1500.0; 5] })
+        });
+        let others =
+            [sequence(None), sequence(Some(0.07)), sequence(Some(0.2)), Waveform::Step { voltages: vec![7.0; 5], at: 0.1 }];
+        for waveform in gaits.chain(others) {
+            for delay in [0.0, 0.0123] {
+                let drive = Drive { waveform: waveform.clone(), positive_gain: 1.0, delay };
+                let of = |t: f64| {
+                    let mut out = [f64::NAN; 5];
+                    drive.voltages(t, &mut out);
+                    out
+                };
+                for t in (0..100).map(|i| 0.0037 * f64::from(i)) {
+                    let length = drive.holds_until(t).min(10.0) - t;
+                    assert!((0..50).all(|i| of(t + length.max(0.0) * f64::from(i) / 50.0) == of(t)), "{drive:?} {t} {length}");
+                }
+                assert!(drive.holds_until(0.001) > 0.013, "{drive:?}");
+            }
+        }
     }
 
     fn at(waveform: Waveform, gain: f64, t: f64) -> Vec<f64> {

@@ -27,7 +27,7 @@ impl Engine for AffectedEngine {
         self.engine.prepare(&self.voltages)
     }
 
-    fn joints(&self) -> &JointState {
+    fn joints(&mut self) -> &JointState {
         self.engine.joints()
     }
 
@@ -67,6 +67,10 @@ impl Engine for AffectedEngine {
 
     fn midpoint(&self) -> bool {
         self.engine.midpoint()
+    }
+
+    fn turns(&self) -> [f64; 2] {
+        self.engine.turns()
     }
 
     fn kinetic_energy(&self) -> Option<f64> {

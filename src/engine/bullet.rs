@@ -342,7 +342,7 @@ impl Engine for BulletEngine {
         if sum == 0.0 { Ok(()) } else { Err(self.find_not_finite()) }
     }
 
-    fn joints(&self) -> &JointState {
+    fn joints(&mut self) -> &JointState {
         &self.state
     }
 

@@ -117,7 +117,7 @@ pub struct Books {
     time_step: f64,
     motions: Vec<Motion>,
     contacts: Vec<Contact>,
-    /// State of the step before.
+    /// State of the step before, or of the last look if the engine works at the middle of steps.
     before: JointState,
     begun: bool,
     ground_energy: f64,
@@ -164,40 +164,41 @@ impl Books {
     /// # Errors
     /// Whatever the engine reports when it is read.
     pub fn take(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
-        let joints = engine.joints();
+        let midpoint = engine.midpoint();
         if self.begun {
+            let [electrical, heat] = self.work(engine);
             let k = self.joint.stiffness;
-            let eta = self.joint.damping_time;
-            let b = &self.before;
-            let mut electrical = 0.0;
-            let mut heat = 0.0;
-            let per_volt = self.joint.rest_angle_per_volt;
-            if engine.midpoint() {
-                // Torques and rates of the middle of the step: the rate is the turn over the step.
-                for ((now, before), volts) in joints.angles.iter().zip(&b.angles).zip(&b.motor_voltages) {
-                    let turn = now - before;
-                    electrical += volts * turn;
-                    heat += turn * turn;
-                }
-                electrical *= per_volt;
-                heat /= self.time_step;
-            } else {
-                for i in 0..joints.rates.len() {
-                    let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
-                    electrical += per_volt * b.motor_voltages[i] * turn;
-                    heat += b.rates[i] * turn;
-                }
-            }
             self.balance.electrical_in_erg += k * electrical;
-            self.balance.damping_out_erg += k * eta * heat;
+            self.balance.damping_out_erg += k * self.joint.damping_time * heat;
         }
-        self.before.clone_from(joints);
-        let every = if engine.midpoint() { LOOK_EVERY_MIDPOINT } else { LOOK_EVERY };
-        if !self.begun || engine.step().is_multiple_of(every) {
+        let every = if midpoint { LOOK_EVERY_MIDPOINT } else { LOOK_EVERY };
+        let looks = !self.begun || engine.step().is_multiple_of(every);
+        if looks || !midpoint {
+            self.before.clone_from(engine.joints());
+        }
+        if looks {
             self.look(engine)?;
             self.begun = true;
         }
         Ok(())
+    }
+
+    /// Work of the piezo moments in the last step over the stiffness, and heat over stiffness and damping time.
+    fn work(&self, engine: &mut dyn Engine) -> [f64; 2] {
+        let per_volt = self.joint.rest_angle_per_volt;
+        if engine.midpoint() {
+            // Torques and rates of the middle of the step: the rate is the turn over the step.
+            let [electrical, heat] = engine.turns();
+            return [electrical * per_volt, heat / self.time_step];
+        }
+        let (joints, b) = (engine.joints(), &self.before);
+        let (mut electrical, mut heat) = (0.0, 0.0);
+        for i in 0..joints.rates.len() {
+            let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
+            electrical += per_volt * b.motor_voltages[i] * turn;
+            heat += b.rates[i] * turn;
+        }
+        [electrical, heat]
     }
 
     /// The balance of the last look.

@@ -1,7 +1,7 @@
 //! Stepping a robot in time.
 //!
-//! An [`Engine`] knows one robot. Each step begins with [`prepare`](Engine::prepare), which reads the joints and computes the
-//! torques for the given voltages, and ends with [`advance`](Engine::advance); between the two the state before the step can be
+//! An [`Engine`] knows one robot. Each step begins with [`prepare`](Engine::prepare), which takes the voltages and looks whether
+//! the joints are still numbers, and ends with [`advance`](Engine::advance); between the two the state before the step can be
 //! observed. The loop over steps lives in [`experiment::run`](crate::experiment::run).
 
 mod affected;
@@ -127,14 +127,14 @@ pub struct Contact {
 
 /// A robot that can be stepped.
 pub trait Engine {
-    /// Reads the joints and computes their torques for the given voltages (V), one per actuator.
+    /// Takes the voltages of the coming step (V), one per actuator.
     ///
     /// # Errors
     /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number.
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError>;
 
-    /// The joints as the last [`prepare`](Self::prepare) found them.
-    fn joints(&self) -> &JointState;
+    /// The joints between [`prepare`](Self::prepare) and [`advance`](Self::advance), with the torques of the coming step.
+    fn joints(&mut self) -> &JointState;
 
     /// Positions (cm) and velocities (cm/s) of the nodes, N·m + 2 times x, y, z: the left end, each joint, the right end.
     ///
@@ -181,6 +181,12 @@ pub trait Engine {
     /// voltages of the step before.
     fn midpoint(&self) -> bool {
         false
+    }
+
+    /// Sums over the joints, in their order, of voltage times turn (V·rad) and of the turn's square (rad²) in the last step, of an engine that
+    /// works at the middle of steps: what the books of energy read in every step.
+    fn turns(&self) -> [f64; 2] {
+        [0.0; 2]
     }
 
     /// Kinetic energy (erg), where it is more exactly known than from the motion of base and joints.

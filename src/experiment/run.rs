@@ -1,6 +1,7 @@
 //! The loop over steps.
 
 use super::Experiment;
+use crate::drive::Means;
 use crate::effects::View;
 use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
@@ -78,9 +79,7 @@ pub fn run(
     let mut interrupted = false;
     let mut done = engine.step();
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
-    // Voltages at the beginning of the coming step.
-    let mut start = voltages.clone();
-    experiment.drive.voltages(done as f64 * experiment.time_step, &mut start);
+    let mut means = Means::new(&experiment.drive, experiment.robot.actuators, done as f64 * experiment.time_step);
     while done < experiment.steps {
         if done.is_multiple_of(OBSERVE_EVERY) && observe(done) == Control::Stop {
             interrupted = true;
@@ -90,7 +89,7 @@ pub fn run(
         time = done as f64 * experiment.time_step;
         if midpoint {
             let end = (done + 1) as f64 * experiment.time_step;
-            experiment.drive.mean(time, end, &mut start, &mut voltages);
+            means.over(time, end, &mut voltages);
         } else {
             experiment.drive.voltages(before, &mut voltages);
         }

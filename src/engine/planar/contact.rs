@@ -1,4 +1,4 @@
-//! One corner on the floor: the law of contact and the linear piece of it that a state stands for.
+//! Corners on the floor, two in lanes: the law of contact and the linear pieces of it that their states stand for.
 //!
 //! Per corner, with the cone K = {|x| ≤ μ z}, compliance R, velocity w and target w*:
 //!
@@ -6,7 +6,9 @@
 //! λ = P_K((w* − w)/R)         the gradient of  −R/2 |λ|²  in w: convex, with four linear pieces
 //! ```
 
-use super::recursion::{Articulated, Spatial};
+use wide::f64x2;
+
+use super::recursion::{Arms, Spatials};
 
 /// Softness of contact as a share of a body's inverse mass: under half its weight a corner gives way by 3·10⁻⁸ cm/s at steps of 10⁻⁴ s.
 /// Ten times stiffer contact changes heights and strides by 10⁻⁴ of them and takes a tenth more iterations.
@@ -47,228 +49,287 @@ impl Law {
     }
 }
 
-/// State of a corner: the linear piece of the law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Touch {
-    #[default]
-    Open,
-    Stick,
-    /// Pushed by the floor towards +x.
-    SlideForward,
-    /// Pushed by the floor towards −x.
-    SlideBackward,
+/// States of two corners, the linear pieces of the law: 0 where a corner is open, 1 where it sticks, 2 where the floor pushes a sliding one
+/// towards +x, −2 where it pushes it towards −x.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Touch(f64x2);
+
+impl Touch {
+    fn new(sticks: f64x2, slides: f64x2, direction: f64x2) -> Self {
+        Self((sticks & f64x2::ONE) | (slides & f64x2::splat(2.0).copysign(direction)))
+    }
+
+    /// The corners of the lanes of the mask `these`; the others are open.
+    fn of(self, these: f64x2) -> Self {
+        Self(self.0 & these)
+    }
+
+    fn sticks(self) -> f64x2 {
+        self.0.simd_eq(f64x2::ONE)
+    }
+
+    fn slides(self) -> f64x2 {
+        self.0.abs().simd_eq(f64x2::splat(2.0))
+    }
+
+    fn is_open(self) -> bool {
+        !self.0.simd_ne(f64x2::ZERO).any()
+    }
+
+    /// As numbers for storing, of which none is negative.
+    pub(super) fn saved(self) -> [f64; 2] {
+        self.0.to_array().map(|state| if state == -2.0 { 3.0 } else { state })
+    }
+
+    pub(super) fn restored(saved: [f64; 2]) -> Self {
+        Self(f64x2::new(saved.map(|state| match state as u8 {
+            1 => 1.0,
+            2 => 2.0,
+            3 => -2.0,
+            _ => 0.0,
+        })))
+    }
 }
 
-/// A coefficient of friction μ, and what the law needs of it.
+/// Coefficients of friction μ, and what the law needs of them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Grip {
-    friction: f64,
+    friction: f64x2,
     /// 1/(1 + μ²).
-    share: f64,
+    share: f64x2,
     /// (μ, 1)/√(1 + μ²): direction of the impulse on a corner that is pushed forward.
-    slide: [f64; 2],
+    slide: [f64x2; 2],
 }
 
 impl Grip {
-    pub(super) fn new(friction: f64) -> Self {
-        let share = 1.0 / (1.0 + friction * friction);
+    pub(super) fn new(friction: f64x2) -> Self {
+        let share = f64x2::ONE / (f64x2::ONE + friction * friction);
         Self { friction, share, slide: [friction * share.sqrt(), share.sqrt()] }
     }
 
-    pub(super) fn friction(&self) -> f64 {
-        self.friction
+    pub(super) fn friction(&self) -> [f64; 2] {
+        self.friction.to_array()
     }
 }
 
-/// One bottom corner.
+/// The bottom corners of a rung's bodies at their reference points or at their other ends.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Corner {
-    /// From the body's reference point (cm).
-    pub(super) arm: [f64; 2],
+pub(super) struct Corners {
+    /// From the bodies' reference points (cm).
+    arm: [f64x2; 2],
+    /// The last look at the floor that found one of them near, and the mask of those.
+    look: u64,
+    near: f64x2,
     touch: Touch,
+    /// The states that the newest solution asks for.
+    asked: Touch,
     /// Vertical velocity that has been taken off the target's end (cm/s).
-    lift: f64,
+    lift: f64x2,
     grip: Grip,
-    /// Mean velocity w* that stops it on the floor at the end (cm/s).
-    target: [f64; 2],
+    /// Mean velocity w* that stops them on the floor at the end (cm/s).
+    target: [f64x2; 2],
     /// Mean velocity of the iterate (cm/s).
-    velocity: [f64; 2],
+    velocity: [f64x2; 2],
     /// Mean velocity of the newest solution, less the iterate's.
-    step: [f64; 2],
-    /// Impulse of the floor on it (dyn·s), times the weight.
-    impulse: [f64; 2],
+    step: [f64x2; 2],
+    /// Impulse of the floor on them (dyn·s), times the weight.
+    impulse: [f64x2; 2],
 }
 
-impl Corner {
-    /// A corner at `arm` from its body's reference point, `gap` (cm) above the floor, that moves with `before` (cm/s): what mean velocity
-    /// stops it on the floor at the step's end.
-    pub(super) fn place(&mut self, arm: [f64; 2], gap: f64, before: [f64; 2], grip: Grip, law: &Law) {
-        self.arm = arm;
+fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+impl Corners {
+    pub(super) fn new(grip: Grip) -> Self {
+        Self { grip, ..Self::default() }
+    }
+
+    /// Changes the friction.
+    pub(super) fn set_grip(&mut self, grip: Grip) {
         self.grip = grip;
-        self.lift = 0.0;
-        let ahead = -gap / law.time_step;
-        let end = if gap > 0.0 || law.frictionless { ahead } else { (PUSH_OUT * ahead).min(PUSH_OUT_SPEED) };
-        self.target = [before[0] * (1.0 - law.weight), before[1] + law.weight * (end - before[1])];
     }
 
-    /// Lets a corner that reaches the floor in this step leave it with the share `restitution` of the speed it comes with (cm/s).
-    pub(super) fn bounce(&mut self, gap: f64, speed: f64, restitution: f64, law: &Law) {
-        let reaches = gap + law.time_step * speed <= 0.0;
-        if restitution > 0.0 && reaches && speed < -LEAST_BOUNCE {
-            self.target[1] = speed + law.weight * (-restitution * speed - speed);
-        }
-    }
-
-    /// Takes off the lift that the convex model gives a corner which slides with the body's motion `mean` (De Saxcé's correction), by a step
-    /// of the fixed-point iteration that is damped by 1/(1 + μ); returns how far the lift changed (cm/s).
-    pub(super) fn take_off_lift(&mut self, mean: &Spatial, law: &Law) -> f64 {
-        if self.touch == Touch::Open {
-            return 0.0;
-        }
-        let mu = self.grip.friction;
-        let sliding = (self.velocity_in(mean)[0] - self.target[0]) / law.weight;
-        let by = (mu * sliding.abs() - self.lift) / (1.0 + mu);
-        self.lift += by;
-        self.target[1] -= law.weight * by;
-        by.abs()
-    }
-
-    /// A corner that nothing touches.
-    pub(super) fn open(&mut self) {
-        self.touch = Touch::Open;
-        self.impulse = [0.0; 2];
-    }
-
-    pub(super) fn is_open(&self) -> bool {
-        self.touch == Touch::Open
-    }
-
-    /// Impulse of the floor on it over the step (dyn·s).
-    pub(super) fn impulse(&self, law: &Law) -> [f64; 2] {
-        self.impulse.map(|part| part / law.weight)
-    }
-
-    /// The law: state and impulse at the mean velocity `v`.
-    fn law(&self, v: [f64; 2], law: &Law) -> (Touch, [f64; 2]) {
-        let pull = [0, 1].map(|k| (self.target[k] - v[k]) * law.stiffness);
-        let mu = self.grip.friction;
-        if pull[0].abs() <= mu * pull[1] {
-            (Touch::Stick, pull)
-        } else if pull[1] + mu * pull[0].abs() <= 0.0 {
-            (Touch::Open, [0.0; 2])
-        } else {
-            let normal = (pull[1] + mu * pull[0].abs()) * self.grip.share;
-            (if pull[0] > 0.0 { Touch::SlideForward } else { Touch::SlideBackward }, [mu * normal * pull[0].signum(), normal])
-        }
-    }
-
-    /// Direction of the impulse of a sliding corner.
-    fn slide(&self, touch: Touch) -> [f64; 2] {
-        let [x, z] = self.grip.slide;
-        [if touch == Touch::SlideForward { x } else { -x }, z]
-    }
-
-    /// a·b through the law's piece: −dλ/dw = stiffness · (0, all, or the part along the slide).
-    fn product(&self, touch: Touch, a: [f64; 2], b: [f64; 2], law: &Law) -> f64 {
-        let dot = |u: [f64; 2], v: [f64; 2]| u[0] * v[0] + u[1] * v[1];
-        law.stiffness
-            * match touch {
-                Touch::Open => 0.0,
-                Touch::Stick => dot(a, b),
-                Touch::SlideForward | Touch::SlideBackward => {
-                    let d = self.slide(touch);
-                    dot(a, d) * dot(b, d)
-                }
-            }
-    }
-
-    /// Adds the corner's terms to its body's inertia and force.
+    /// Prepares those of the mask `near`, at `arm` from their bodies' reference points, `gap` (cm) above the floor, that move with `before`
+    /// (cm/s): what mean velocity stops them on the floor at the step's end. They go on in the states of the step before, if this was near
+    /// in the `look` before this one.
     #[inline(always)]
-    pub(super) fn add_to(&self, body: &mut Articulated, law: &Law) {
-        let k = law.stiffness;
+    pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
+        let weight = f64x2::splat(law.weight);
+        let ahead = -gap / f64x2::splat(law.time_step);
+        let end = if law.frictionless {
+            ahead
+        } else {
+            let out = (f64x2::splat(PUSH_OUT) * ahead).fast_min(f64x2::splat(PUSH_OUT_SPEED));
+            gap.simd_gt(f64x2::ZERO).select(ahead, out)
+        };
+        self.touch = self.touch(look - 1).of(near);
+        self.look = look;
+        self.near = near;
+        self.arm = arm;
+        self.lift = f64x2::ZERO;
+        self.target = [before[0] * (f64x2::ONE - weight), before[1] + weight * (end - before[1])];
+    }
+
+    /// Takes stored states up again.
+    pub(super) fn restore(&mut self, touch: Touch, look: u64) {
+        (self.touch, self.look) = (touch, look);
+        self.impulse = [f64x2::ZERO; 2];
+    }
+
+    /// Lets corners that reach the floor in this step leave it with the share `restitution` of the speed they come with (cm/s).
+    pub(super) fn bounce(&mut self, gap: f64x2, speed: f64x2, restitution: f64, law: &Law) {
+        if restitution <= 0.0 {
+            return;
+        }
+        let reach = (gap + f64x2::splat(law.time_step) * speed).simd_le(f64x2::ZERO);
+        let fast = speed.simd_lt(f64x2::splat(-LEAST_BOUNCE));
+        let bounced = speed + f64x2::splat(law.weight) * (f64x2::splat(-restitution) * speed - speed);
+        self.target[1] = (reach & fast).select(bounced, self.target[1]);
+    }
+
+    /// Takes off the lift that the convex model gives corners which slide with their bodies' motion `mean` (De Saxcé's correction), by a step
+    /// of the fixed-point iteration that is damped by 1/(1 + μ); returns how far the lifts changed at most (cm/s).
+    pub(super) fn take_off_lift(&mut self, mean: &Spatials, law: &Law) -> f64 {
+        let weight = f64x2::splat(law.weight);
+        let mu = self.grip.friction;
+        let sliding = (self.velocity_in(mean)[0] - self.target[0]) / weight;
+        let by = (mu * sliding.abs() - self.lift) / (f64x2::ONE + mu);
+        let by = by & (self.touch.sticks() | self.touch.slides());
+        self.lift += by;
+        self.target[1] -= weight * by;
+        let [a, b] = by.abs().to_array();
+        a.max(b)
+    }
+
+    /// Whether neither touches, of corners near the floor.
+    pub(super) fn is_open(&self) -> bool {
+        self.touch.is_open()
+    }
+
+    /// The states, in the time of a look.
+    pub(super) fn touch(&self, look: u64) -> Touch {
+        if self.look == look { self.touch } else { Touch::default() }
+    }
+
+    /// Arm (cm) and impulse of the floor over the step (dyn·s) of one of them, in the time of a look.
+    pub(super) fn of_body(&self, lane: usize, look: u64, law: &Law) -> [[f64; 2]; 2] {
+        let of = |part: f64x2| part.to_array()[lane];
+        let impulse = if self.look == look { self.impulse.map(of) } else { [0.0; 2] };
+        [self.arm.map(of), impulse.map(|part| part / law.weight)]
+    }
+
+    /// The law: states and impulses at the mean velocities `v`.
+    #[inline(always)]
+    fn law(&self, v: [f64x2; 2], law: &Law) -> (Touch, [f64x2; 2]) {
+        let stiffness = f64x2::splat(law.stiffness);
+        let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
+        let mu = self.grip.friction;
+        let sideways = pull[0].abs();
+        let sticks = sideways.simd_le(mu * pull[1]) & self.near;
+        let pressed = pull[1] + mu * sideways;
+        let slides = pressed.simd_gt(f64x2::ZERO) & self.near & !sticks;
+        let normal = pressed * self.grip.share;
+        let push = (mu * normal).copysign(pull[0]);
+        let impulse = [(sticks & pull[0]) | (slides & push), (sticks & pull[1]) | (slides & normal)];
+        (Touch::new(sticks, slides, pull[0]), impulse)
+    }
+
+    /// Direction of the impulses of sliding corners.
+    #[inline(always)]
+    fn slide(&self, touch: Touch) -> [f64x2; 2] {
+        [self.grip.slide[0].copysign(touch.0), self.grip.slide[1]]
+    }
+
+    /// a·b through the law's pieces: −dλ/dw = stiffness · (0, all, or the part along the slide).
+    #[inline(always)]
+    fn product(&self, touch: Touch, a: [f64x2; 2], b: [f64x2; 2], law: &Law) -> f64x2 {
+        let d = self.slide(touch);
+        let along = dot(a, d) * dot(b, d);
+        f64x2::splat(law.stiffness) * ((touch.sticks() & dot(a, b)) | (touch.slides() & along))
+    }
+
+    /// Adds the corners' terms to their bodies' inertia and force.
+    #[inline(always)]
+    pub(super) fn add_to(&self, bodies: &mut Arms, law: &Law) {
+        let stiffness = f64x2::splat(law.stiffness);
         let [ax, az] = self.arm;
         let [tx, tz] = self.target;
-        let Articulated { inertia, force } = body;
-        match self.touch {
-            Touch::Open => {}
-            Touch::Stick => {
-                inertia[0] += k * (ax * ax + az * az);
-                inertia[1] -= k * az;
-                inertia[2] += k * ax;
-                inertia[3] += k;
-                inertia[5] += k;
-                force[0] += k * (ax * tz - az * tx);
-                force[1] += k * tx;
-                force[2] += k * tz;
-            }
-            Touch::SlideForward | Touch::SlideBackward => {
-                let [dx, dz] = self.slide(self.touch);
-                // Velocity of the corner along d is row · (ω, v).
-                let row = [dz * ax - dx * az, dx, dz];
-                let stiff = row.map(|part| k * part);
-                let wanted = dx * tx + dz * tz;
-                inertia[0] += stiff[0] * row[0];
-                inertia[1] += stiff[0] * row[1];
-                inertia[2] += stiff[0] * row[2];
-                inertia[3] += stiff[1] * row[1];
-                inertia[4] += stiff[1] * row[2];
-                inertia[5] += stiff[2] * row[2];
-                for i in 0..3 {
-                    force[i] += stiff[i] * wanted;
-                }
+        let Arms { inertia, force } = bodies;
+        let sticks = self.touch.sticks();
+        if sticks.any() {
+            let k = sticks & stiffness;
+            inertia[0] += k * (ax * ax + az * az);
+            inertia[1] -= k * az;
+            inertia[2] += k * ax;
+            inertia[3] += k;
+            inertia[5] += k;
+            force[0] += k * (ax * tz - az * tx);
+            force[1] += k * tx;
+            force[2] += k * tz;
+        }
+        let slides = self.touch.slides();
+        if slides.any() {
+            let k = slides & stiffness;
+            let [dx, dz] = self.slide(self.touch);
+            // Velocity of the corner along d is row · (ω, v).
+            let row = [dz * ax - dx * az, dx, dz];
+            let stiff = row.map(|part| k * part);
+            let wanted = dx * tx + dz * tz;
+            inertia[0] += stiff[0] * row[0];
+            inertia[1] += stiff[0] * row[1];
+            inertia[2] += stiff[0] * row[2];
+            inertia[3] += stiff[1] * row[1];
+            inertia[4] += stiff[1] * row[2];
+            inertia[5] += stiff[2] * row[2];
+            for i in 0..3 {
+                force[i] += stiff[i] * wanted;
             }
         }
     }
 
-    fn velocity_in(&self, mean: &Spatial) -> [f64; 2] {
+    #[inline(always)]
+    fn velocity_in(&self, mean: &Spatials) -> [f64x2; 2] {
         [mean[1] - mean[0] * self.arm[1], mean[2] + mean[0] * self.arm[0]]
     }
 
-    /// Whether the body's motion `mean` asks for the state that it was solved with; the impulse belongs to it then.
-    pub(super) fn agrees(&mut self, mean: &Spatial, law: &Law) -> bool {
-        let (touch, impulse) = self.law(self.velocity_in(mean), law);
-        self.impulse = impulse;
-        touch == self.touch
+    /// Whether the bodies' motion `mean` asks for the states that it was solved with; the impulses belong to it then.
+    #[inline(always)]
+    pub(super) fn agrees(&mut self, mean: &Spatials, law: &Law) -> bool {
+        (self.asked, self.impulse) = self.law(self.velocity_in(mean), law);
+        !self.asked.0.simd_ne(self.touch.0).any()
     }
 
-    /// Takes the body's motion `mean` as iterate.
-    pub(super) fn accept(&mut self, mean: &Spatial, law: &Law) {
+    /// Takes the bodies' motion `mean`, which has just been asked whether it [`agrees`](Self::agrees), as iterate.
+    #[inline(always)]
+    pub(super) fn accept(&mut self, mean: &Spatials) {
         self.velocity = self.velocity_in(mean);
-        (self.touch, self.impulse) = self.law(self.velocity, law);
+        self.touch = self.asked;
     }
 
     /// Prepares a search from the iterate to `mean`; returns impulse·step at the iterate as the piece extends it to the end.
-    pub(super) fn aim(&mut self, mean: &Spatial, law: &Law) -> f64 {
+    pub(super) fn aim(&mut self, mean: &Spatials, law: &Law) -> f64x2 {
         let to = self.velocity_in(mean);
-        self.step = [0, 1].map(|k| to[k] - self.velocity[k]);
-        self.product(self.touch, [0, 1].map(|k| self.target[k] - to[k]), self.step, law)
+        self.step = [to[0] - self.velocity[0], to[1] - self.velocity[1]];
+        self.product(self.touch, [self.target[0] - to[0], self.target[1] - to[1]], self.step, law)
+    }
+
+    /// The iterate's velocity at the share `t` of the search.
+    #[inline(always)]
+    fn velocity_at(&self, t: f64) -> [f64x2; 2] {
+        let t = f64x2::splat(t);
+        [self.velocity[0] + t * self.step[0], self.velocity[1] + t * self.step[1]]
     }
 
     /// impulse·step and its slope at the share `t` of the search.
-    pub(super) fn search(&self, t: f64, law: &Law) -> (f64, f64) {
-        let v = [0, 1].map(|k| self.velocity[k] + t * self.step[k]);
-        let (touch, impulse) = self.law(v, law);
-        (impulse[0] * self.step[0] + impulse[1] * self.step[1], -self.product(touch, self.step, self.step, law))
+    pub(super) fn search(&self, t: f64, law: &Law) -> [f64x2; 2] {
+        let (touch, impulse) = self.law(self.velocity_at(t), law);
+        [dot(impulse, self.step), -self.product(touch, self.step, self.step, law)]
     }
 
     /// Goes the share `t` of the search.
     pub(super) fn go(&mut self, t: f64, law: &Law) {
-        self.velocity = [0, 1].map(|k| self.velocity[k] + t * self.step[k]);
+        self.velocity = self.velocity_at(t);
         (self.touch, self.impulse) = self.law(self.velocity, law);
-    }
-
-    /// The state as a number for storing.
-    pub(super) fn saved(&self) -> f64 {
-        f64::from(self.touch as u8)
-    }
-
-    pub(super) fn restore(&mut self, saved: f64) {
-        self.impulse = [0.0; 2];
-        self.touch = match saved as u8 {
-            1 => Touch::Stick,
-            2 => Touch::SlideForward,
-            3 => Touch::SlideBackward,
-            _ => Touch::Open,
-        };
     }
 }

@@ -3,23 +3,29 @@
 use wide::f64x2;
 
 use super::LARGEST_FRICTION;
-use super::contact::{Corner, Grip, Law};
-use super::recursion::{Articulated, Rung, Spatial};
+use super::contact::{Corners, Grip, Law, Touch};
+use super::recursion::{Arms, Rung, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
 /// The corners of all bodies. Those that may touch in the step at hand are listed.
 #[derive(Debug, Default)]
 pub(super) struct Floor {
-    /// Per rung: at the reference points, then at the other ends, of lane 0 and lane 1 each.
-    corners: Vec<[Corner; 4]>,
-    grips: Vec<[Grip; 2]>,
+    /// Two places per rung: at the reference points, then at the other ends.
+    corners: Vec<Corners>,
+    /// Of each rung.
+    grips: Vec<Grip>,
     surface: Option<Surface>,
     half_thickness: f64,
-    near: Vec<(usize, usize)>,
-    near_before: Vec<(usize, usize)>,
-    is_near: Vec<[bool; 4]>,
-    /// Whether any corner of the rung is not open.
-    touching: Vec<bool>,
+    /// Places, in their order.
+    near: Vec<usize>,
+    /// How many times corners were looked for.
+    looks: u64,
+}
+
+/// Height of both reference points of a rung above the floor, with half a thickness (cm), and their velocity (cm/s).
+struct Reference {
+    gap: f64x2,
+    velocity: [f64x2; 2],
 }
 
 /// A floor that returns some of an impact, or whose friction depends on speed.
@@ -36,84 +42,77 @@ impl Surface {
         (restitution != 0.0 || stick_slip != StickSlip::OFF).then_some(Self { restitution, stick_slip })
     }
 
-    /// Friction at the sliding speed that the step begins with.
-    fn grip(&self, plain: Grip, speed: f64) -> Grip {
-        Grip::new(self.stick_slip.friction(plain.friction(), speed).min(LARGEST_FRICTION))
+    /// Friction at the sliding speeds that the step begins with.
+    fn grip(&self, plain: Grip, speed: f64x2) -> Grip {
+        let [a, b] = plain.friction();
+        let [u, v] = speed.to_array();
+        let friction = [self.stick_slip.friction(a, u), self.stick_slip.friction(b, v)];
+        Grip::new(f64x2::new(friction.map(|friction| friction.min(LARGEST_FRICTION))))
     }
 }
 
 impl Floor {
     /// Corners with the coefficients of friction of both bodies of each rung, under boxes of twice `half_thickness` (cm).
     pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
-        let count = frictions.len();
-        Self {
-            corners: vec![[Corner::default(); 4]; count],
-            grips: frictions.iter().map(|pair| pair.map(Grip::new)).collect(),
-            surface,
-            half_thickness,
-            near: Vec::with_capacity(4 * count),
-            near_before: Vec::with_capacity(4 * count),
-            is_near: vec![[false; 4]; count],
-            touching: vec![false; count],
-        }
+        let grips: Vec<Grip> = frictions.iter().map(|pair| Grip::new(f64x2::new(*pair))).collect();
+        let corners: Vec<Corners> = grips.iter().flat_map(|grip| [Corners::new(*grip); 2]).collect();
+        Self { near: Vec::with_capacity(corners.len()), corners, grips, surface, half_thickness, looks: 0 }
     }
 
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
     /// moving with `velocity` (cm/s); whether any does. Lanes without mass have no corners.
     pub(super) fn find(&mut self, rungs: &[Rung], height: f64, velocity: [f64; 2], law: &Law) -> bool {
-        std::mem::swap(&mut self.near, &mut self.near_before);
         self.near.clear();
-        for &(rung, slot) in &self.near_before {
-            self.is_near[rung][slot] = false;
-        }
+        self.looks += 1;
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
         let mut moving = velocity.map(f64x2::splat);
         for (k, rung) in rungs.iter().enumerate() {
-            let rate = rung.motion[0];
+            let (rate, across) = (rung.motion[0], rung.across);
             // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
             let down = half.copysign(rung.along[0]);
-            let offset = [down * rung.along[1], -down * rung.along[0]];
-            for end in 0..2 {
-                let arm = if end == 0 { offset } else { [rung.across[0] + offset[0], rung.across[1] + offset[1]] };
-                let gap = at + arm[1];
-                let vertical = moving[1] + rate * arm[0];
-                let near = gap.simd_lt(reach - step * vertical);
-                if near.none() {
-                    continue;
-                }
-                let before = [(moving[0] - rate * arm[1]).to_array(), vertical.to_array()];
-                let (near, gap, [x, z]) = (near.to_bitmask(), gap.to_array(), arm.map(|part| part.to_array()));
-                for lane in 0..2 {
-                    if near & (1 << lane) != 0 && rung.mass.as_array()[lane] > 0.0 {
-                        let slot = 2 * end + lane;
-                        let before = [before[0][lane], before[1][lane]];
-                        let corner = &mut self.corners[k][slot];
-                        let (gap, mut grip) = (gap[lane], self.grips[k][lane]);
-                        if let Some(surface) = &self.surface {
-                            grip = surface.grip(grip, before[0]);
-                        }
-                        corner.place([x[lane], z[lane]], gap, before, grip, law);
-                        if let Some(surface) = &self.surface {
-                            corner.bounce(gap, before[1], surface.restitution, law);
-                        }
-                        self.is_near[k][slot] = true;
-                        self.near.push((k, slot));
-                    }
-                }
+            let (x, z) = (down * rung.along[1], -down * rung.along[0]);
+            let (outer_x, outer_z) = (across[0] + x, across[1] + z);
+            let near = |x: f64x2, z: f64x2| (at + z).simd_lt(reach - step * (moving[1] + rate * x));
+            let (inner, outer) = (near(x, z), near(outer_x, outer_z));
+            if (inner | outer).any() {
+                // Most rungs are not: what only these need is made here.
+                let from = Reference { gap: at, velocity: moving };
+                self.place(2 * k, inner, [x, z], rung, &from, law);
+                self.place(2 * k + 1, outer, [outer_x, outer_z], rung, &from, law);
             }
-            at = next(at, rung.across[1], k);
-            moving = [next(moving[0], -rate * rung.across[1], k), next(moving[1], rate * rung.across[0], k)];
+            at = next(at, across[1], k);
+            moving = [next(moving[0], -rate * across[1], k), next(moving[1], rate * across[0], k)];
         }
-        for &(rung, slot) in &self.near_before {
-            if !self.is_near[rung][slot] {
-                self.corners[rung][slot].open();
-            }
-        }
-        self.mark();
         !self.near.is_empty()
+    }
+
+    /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.
+    #[inline(never)]
+    fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], rung: &Rung, from: &Reference, law: &Law) {
+        let near = near & rung.mass.simd_gt(f64x2::ZERO);
+        if !near.any() {
+            return;
+        }
+        let rate = rung.motion[0];
+        let gap = from.gap + arm[1];
+        let velocity = [from.velocity[0] - rate * arm[1], from.velocity[1] + rate * arm[0]];
+        self.corners[place].place(self.looks, near, arm, gap, velocity, law);
+        if self.surface.is_some() {
+            self.feel_surface(place, gap, velocity, law);
+        }
+        self.near.push(place);
+    }
+
+    /// Prepares corners for a floor that is not plain.
+    #[inline(never)]
+    fn feel_surface(&mut self, place: usize, gap: f64x2, velocity: [f64x2; 2], law: &Law) {
+        let Some(surface) = &self.surface else { return };
+        let corners = &mut self.corners[place];
+        corners.set_grip(surface.grip(self.grips[place / 2], velocity[0]));
+        corners.bounce(gap, velocity[1], surface.restitution, law);
     }
 
     /// Force per sliding speed and link on the floor (dyn·s/cm).
@@ -145,75 +144,86 @@ impl Floor {
         }
     }
 
-    /// Notes which rungs have corners that are not open.
-    pub(super) fn mark(&mut self) {
-        self.touching.fill(false);
-        for &(rung, slot) in &self.near {
-            self.touching[rung] |= !self.corners[rung][slot].is_open();
+    /// The corners that may touch, for the walk to the root.
+    pub(super) fn inwards(&self) -> Inwards<'_> {
+        Inwards { corners: &self.corners, near: &self.near }
+    }
+
+    /// Calls `each` with all near corners and the mean motions of their bodies.
+    #[inline(always)]
+    pub(super) fn near(&mut self, rungs: &[Rung], mut each: impl FnMut(&mut Corners, &Spatials)) {
+        for &place in &self.near {
+            each(&mut self.corners[place], &rungs[place / 2].mean);
         }
     }
 
-    pub(super) fn touches(&self, rung: usize) -> bool {
-        self.touching[rung]
-    }
-
-    /// What the corners of a rung add to the inertia and force of its bodies.
-    pub(super) fn of_rung(&self, rung: usize, law: &Law) -> [Articulated; 2] {
-        let mut bodies = [Articulated::default(); 2];
-        for (slot, corner) in self.corners[rung].iter().enumerate() {
-            corner.add_to(&mut bodies[slot % 2], law);
-        }
-        bodies
-    }
-
-    /// Calls `each` with every near corner and the mean motion of its body.
-    pub(super) fn near(&mut self, rungs: &[Rung], mut each: impl FnMut(&mut Corner, &Spatial)) {
-        for &(rung, slot) in &self.near {
-            let mean = rungs[rung].mean.map(|part| part.as_array()[slot % 2]);
-            each(&mut self.corners[rung][slot], &mean);
-        }
-    }
-
-    /// The sum of `of` over the near corners.
-    pub(super) fn sum(&self, of: impl Fn(&Corner) -> (f64, f64)) -> (f64, f64) {
-        self.near.iter().fold((0.0, 0.0), |sum, &(rung, slot)| {
-            let (a, b) = of(&self.corners[rung][slot]);
-            (sum.0 + a, sum.1 + b)
+    /// The sums of `of` over the near corners, one after the other.
+    #[inline(always)]
+    pub(super) fn sum(&self, of: impl Fn(&Corners) -> [f64x2; 2]) -> [f64; 2] {
+        self.near.iter().fold([0.0; 2], |sum, &place| {
+            let [a, b] = of(&self.corners[place]).map(f64x2::to_array);
+            [sum[0] + a[0] + a[1], sum[1] + b[0] + b[1]]
         })
     }
 
-    /// The corners of one body: at its reference point and at its other end.
-    pub(super) fn of_body(&self, rung: usize, lane: usize) -> [&Corner; 2] {
-        [&self.corners[rung][lane], &self.corners[rung][2 + lane]]
+    /// Arm (cm) and impulse (dyn·s) of the corners of one body: at its reference point and at its other end.
+    pub(super) fn of_body(&self, rung: usize, lane: usize, law: &Law) -> [[[f64; 2]; 2]; 2] {
+        [0, 1].map(|end| self.corners[2 * rung + end].of_body(lane, self.looks, law))
     }
 
     /// Sets friction to zero, or back to what it is.
-    pub(super) fn swap_grips(&mut self, other: &mut Vec<[Grip; 2]>) {
+    pub(super) fn swap_grips(&mut self, other: &mut Vec<Grip>) {
         std::mem::swap(&mut self.grips, other);
+        for (place, corners) in self.corners.iter_mut().enumerate() {
+            corners.set_grip(self.grips[place / 2]);
+        }
     }
 
     /// Forgets all contact.
     pub(super) fn clear(&mut self) {
-        self.corners.iter_mut().flatten().for_each(|corner| *corner = Corner::default());
         self.near.clear();
+        self.looks += 1;
     }
 
-    /// The states of all corners as numbers for storing.
+    /// The states of all corners as numbers for storing: four per rung, at the reference points and at the other ends.
     pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
-        self.corners.iter().flatten().map(Corner::saved)
+        self.corners.iter().flat_map(|corners| corners.touch(self.looks).saved())
     }
 
-    /// Takes the states up again: all but the open ones were near.
+    /// Takes the states up again.
     pub(super) fn restore(&mut self, saved: &[f64]) {
-        self.near.clear();
-        for (k, (corners, saved)) in self.corners.iter_mut().zip(saved.chunks_exact(4)).enumerate() {
-            for (slot, (corner, saved)) in corners.iter_mut().zip(saved).enumerate() {
-                corner.restore(*saved);
-                if !corner.is_open() {
-                    self.near.push((k, slot));
-                }
+        for (corners, saved) in self.corners.iter_mut().zip(saved.as_chunks().0) {
+            corners.restore(Touch::restored(*saved), self.looks);
+        }
+    }
+}
+
+/// The corners that may touch, to be taken from the tips to the root.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Inwards<'a> {
+    corners: &'a [Corners],
+    near: &'a [usize],
+}
+
+impl Inwards<'_> {
+    /// Takes those of `rung` off the end and returns what they add to the inertia and force of its bodies; none if all are open.
+    #[inline(always)]
+    pub(super) fn take(&mut self, rung: usize, law: &Law) -> Option<Arms> {
+        if self.near.last().is_none_or(|place| place / 2 != rung) {
+            return None;
+        }
+        let (mut bodies, mut touch) = (Arms::default(), false);
+        while let [rest @ .., place] = self.near
+            && place / 2 == rung
+        {
+            self.near = rest;
+            let corners = &self.corners[*place];
+            if !corners.is_open() {
+                corners.add_to(&mut bodies, law);
+                touch = true;
             }
         }
+        touch.then_some(bodies)
     }
 }
 

@@ -49,8 +49,8 @@ use wide::f64x2;
 pub(super) use self::beyond::GAUSS;
 use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
-use self::floor::{Floor, Surface, next};
-use self::recursion::{Hold, Rung, Spatials, solve};
+use self::floor::{Floor, Inwards, Surface, next};
+use self::recursion::{Hold, Rung, Spatials, direction, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
@@ -62,10 +62,8 @@ pub(super) const LARGEST_FRICTION: f64 = 10.0;
 /// a velocity that springs and dampers dictate keeps −(1 − w)/w of an alternation per step. For a mode of angular frequency ω this adds
 /// h (w − 1/2) ω/2 to the damping ratio, of second order in h.
 const NUMERICAL_DAMPING: f64 = 50.0;
-/// The links' directions are computed anew every so many steps and when they turn by more than this (rad), for which the series in
-/// [`turned`] are exact to the last digit.
+/// The links' directions are computed anew every so many steps, for turning them on loses a last digit at times.
 const EXACT_EVERY: u64 = 64;
-const LARGEST_SERIES: f64 = 0.1;
 
 /// How sliding corners are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,14 +102,21 @@ pub struct PlanarEngine {
     centre: [f64; 2],
     velocity: [f64; 2],
     /// None but for robots on the ground.
-    floor: Option<Floor>,
+    floor: Option<Box<Floor>>,
     friction: FrictionModel,
     /// Mean motions of the reference points in the iterate of the contact problem.
     iterate: Vec<Spatials>,
     law: Law,
     weight: f64,
     step: u64,
+    /// What was last asked for of the joints, but for the voltages, which are always those of [`prepare`](Engine::prepare).
     state: JointState,
+    /// The actuators' voltages of the last [`prepare`](Engine::prepare) (V).
+    voltages: Vec<f64>,
+    /// Whether the state is known to be numbers, because the changes of the last step were.
+    finite: bool,
+    /// Of the last step, for the books of energy.
+    turns: [f64; 2],
     /// Newton iterations so far, of all steps.
     iterations: u64,
     /// Energy that the weight of the step's end has taken so far (erg).
@@ -202,7 +207,8 @@ impl PlanarEngine {
             kept: vec![[f64x2::ZERO; 2]; rungs.len()],
             centre: if clamped { [left, 0.0] } else { [moment / mass, 0.0] },
             velocity: [0.0; 2],
-            floor: (robot.mount == Mount::Ground).then(|| Floor::new(&frictions, 0.5 * thickness, Surface::new(extensions))),
+            floor: (robot.mount == Mount::Ground)
+                .then(|| Box::new(Floor::new(&frictions, 0.5 * thickness, Surface::new(extensions)))),
             friction: FrictionModel::default(),
             iterate: vec![Spatials::default(); rungs.len()],
             rungs,
@@ -210,6 +216,9 @@ impl PlanarEngine {
             weight,
             step: 0,
             state: JointState { angles: joints(), rates: joints(), torques: joints(), motor_voltages: joints() },
+            voltages: Vec::with_capacity(robot.actuators),
+            finite: false,
+            turns: [0.0; 2],
             iterations: 0,
             numerical_loss: 0.0,
         })
@@ -240,24 +249,26 @@ impl PlanarEngine {
         what(&self.rungs[rung]).as_array()[lane]
     }
 
-    /// Turns the links to where they are in the middle of the step if all goes on at its rates.
-    ///
-    /// They turn on from where they were, by the series of sine and cosine, which is several times faster than computing both anew. That
-    /// loses a last digit at times, so it is done every [`EXACT_EVERY`] steps, and where they turn far.
-    fn turn(&mut self) {
+    /// Turns the links to where they are in the middle of the step if all goes on at its rates, and loads there what is known of the step's
+    /// right side: momenta, gravity, drag and the joints' torques for `share` (s).
+    fn begin_step(&mut self, share: f64) {
         let ahead = f64x2::splat(0.5 * self.time_step);
         let exact = self.step.is_multiple_of(EXACT_EVERY);
-        for rung in &mut self.rungs {
-            let to = rung.angle + ahead * rung.motion[0];
-            let by = to - rung.posed;
-            rung.posed = to;
-            let [a, b] = by.to_array();
-            rung.along = if exact || a.abs() > LARGEST_SERIES || b.abs() > LARGEST_SERIES {
-                direction(to)
-            } else {
-                turned(rung.along, by)
-            };
-            rung.across = rung.along.map(|along| rung.reach * along);
+        let pull = self.pull.map(|part| f64x2::splat(share * part));
+        let share = f64x2::splat(share);
+        let drag = self.beyond.as_ref().filter(|beyond| beyond.has_drag());
+        let mut inner = f64x2::ZERO;
+        for (k, rung) in self.rungs.iter_mut().enumerate() {
+            rung.turn_to(rung.angle + ahead * rung.motion[0], exact);
+            rung.load_torque(-share, inner);
+            inner = outwards(rung.angle, k);
+            let [rate, x, z] = rung.motion;
+            let mut momentum = [rung.inertia * rate, rung.mass * (x + pull[0]), rung.mass * (z + pull[1])];
+            if let Some(beyond) = drag {
+                let drag = beyond.drag(rung);
+                (0..3).for_each(|k| momentum[k] += share * drag[k]);
+            }
+            rung.load(momentum);
         }
     }
 
@@ -266,23 +277,24 @@ impl PlanarEngine {
         for (rung, kept) in self.rungs.iter_mut().zip(&mut self.kept) {
             *kept = rung.along;
             rung.along = direction(rung.angle);
-            rung.across = rung.along.map(|along| rung.reach * along);
+            rung.lay();
         }
         let seen = look(self);
         for (rung, kept) in self.rungs.iter_mut().zip(&self.kept) {
             rung.along = *kept;
-            rung.across = rung.along.map(|along| rung.reach * along);
+            rung.lay();
         }
         seen
     }
 
     /// Mean over the mass of what each rung says of its reference points, walked from the root's, and of its part of what it says of its other
     /// ends.
-    fn mean(&self, across: impl Fn(&Rung) -> [f64x2; 2]) -> [f64; 2] {
-        let (mut at, mut sum) = ([f64x2::ZERO; 2], [f64x2::ZERO; 2]);
+    #[inline(always)]
+    fn mean<const N: usize>(&self, across: impl Fn(&Rung) -> [f64x2; N]) -> [f64; N] {
+        let (mut at, mut sum) = ([f64x2::ZERO; N], [f64x2::ZERO; N]);
         for (k, rung) in self.rungs.iter().enumerate() {
             let across = across(rung);
-            for i in 0..2 {
+            for i in 0..N {
                 sum[i] += rung.share * (at[i] + rung.middle * across[i]);
                 at[i] = next(at[i], across[i], k);
             }
@@ -290,27 +302,30 @@ impl PlanarEngine {
         sum.map(|part| part.reduce_add())
     }
 
-    /// Where the root's reference point is (cm), as the links are turned, `ahead` (s) of the state.
-    fn root_position(&self, ahead: f64) -> [f64; 2] {
+    /// Where the root's reference point is (cm), as the links are turned, and its velocity (cm/s), from the rates and the velocity of the
+    /// centre of mass.
+    fn root_motion(&self) -> ([f64; 2], [f64; 2]) {
         if self.clamped() {
-            return self.centre;
+            return (self.centre, [0.0; 2]);
         }
-        let mean = self.mean(|rung| rung.across);
-        [0, 1].map(|k| self.centre[k] + ahead * self.velocity[k] - mean[k])
+        let position = self.mean(|rung| rung.across);
+        let velocity = self.mean(|rung| rung.velocity_across());
+        ([0, 1].map(|k| self.centre[k] - position[k]), [0, 1].map(|k| self.velocity[k] - velocity[k]))
     }
 
-    /// Its velocity (cm/s), from the rates and the velocity of the centre of mass.
-    fn root_velocity(&self) -> [f64; 2] {
-        if self.clamped() {
-            return [0.0; 2];
-        }
-        let mean = self.mean(|rung| [-rung.motion[0] * rung.across[1], rung.motion[0] * rung.across[0]]);
-        [0, 1].map(|k| self.velocity[k] - mean[k])
+    /// Height of a free robot's root (cm) in the middle of the step, as the links are turned, and its velocity at the start.
+    fn root_over_floor(&self) -> (f64, [f64; 2]) {
+        let [height, x, z] = self.mean(|rung| {
+            let [x, z] = rung.velocity_across();
+            [rung.across[1], x, z]
+        });
+        let ahead = 0.5 * self.time_step;
+        (self.centre[1] + ahead * self.velocity[1] - height, [self.velocity[0] - x, self.velocity[1] - z])
     }
 
     /// Position and velocity of the left end of the chain, as the links are turned, with the state's velocities.
     fn left_end(&self) -> ([f64; 2], [f64; 2]) {
-        let (mut position, mut velocity) = (self.root_position(0.0), self.root_velocity());
+        let (mut position, mut velocity) = self.root_motion();
         // The left arm's other ends are left ends.
         for rung in self.rungs.iter().skip(1) {
             if rung.mass.to_array()[0] > 0.0 {
@@ -350,63 +365,21 @@ impl PlanarEngine {
     }
 
     fn solve_once(&mut self) -> Result<(), EngineError> {
-        if !self.solve_on_floor(&self.law.clone())? {
-            solve(&mut self.rungs, self.hold, None);
+        let law = self.law;
+        if !self.solve_on_floor(&law)? {
+            solve(&mut self.rungs, self.hold, Inwards::default(), &law);
         }
         Ok(())
     }
 
-    /// Sets the joints' parts of the step's right side: `share` (s) of their torques at the angles as they are.
-    fn load_torques(&mut self, share: f64) {
-        let share = f64x2::splat(-share);
-        let mut inner = f64x2::splat(self.rungs[0].angle.to_array()[0]);
-        if self.hold == Hold::Hinged {
-            let root = &mut self.rungs[0];
-            root.torque = share * root.stiffness * root.angle;
+    /// Sets the joints' voltages and rest angles, if the actuators' `voltages` are not those of the step before.
+    fn apply(&mut self, voltages: &[f64]) {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        if self.voltages.len() == voltages.len() && self.voltages.iter().zip(voltages).all(same) {
+            return;
         }
-        for rung in self.rungs.iter_mut().skip(1) {
-            // Spring and drive at the start; the implicit part adds what the mean rate makes.
-            rung.torque = share * rung.stiffness * (rung.angle - inner - rung.rest_angle);
-            inner = rung.angle;
-        }
-    }
-}
-
-/// Gravity along x and z (cm/s²) of a floor that rises by `slope` (rad) along +x, in its axes.
-fn pull(gravity: f64, slope: f64) -> [f64; 2] {
-    if slope == 0.0 { [0.0, -gravity] } else { [-gravity * slope.sin(), -gravity * slope.cos()] }
-}
-
-/// Rung and lane of body `i` of a chain with this root.
-fn place(i: usize, root: usize) -> (usize, usize) {
-    if i <= root { (root - i, 0) } else { (i - root, 1) }
-}
-
-fn put(lanes: &mut f64x2, lane: usize, value: f64) {
-    lanes.as_mut_array()[lane] = value;
-}
-
-/// Directions of two angles.
-fn direction(angle: f64x2) -> [f64x2; 2] {
-    let angle = angle.to_array();
-    [f64x2::new(angle.map(f64::cos)), f64x2::new(angle.map(f64::sin))]
-}
-
-/// Two directions turned by small angles (rad), at unit length.
-#[inline(always)]
-fn turned([x, z]: [f64x2; 2], by: f64x2) -> [f64x2; 2] {
-    let c = f64x2::splat;
-    let s = by * by;
-    let sin =
-        by * (c(1.0) - s * c(1.0 / 6.0) * (c(1.0) - s * c(0.05) * (c(1.0) - s * c(1.0 / 42.0) * (c(1.0) - s * c(1.0 / 72.0)))));
-    let cos = c(1.0) - s * c(0.5) * (c(1.0) - s * c(1.0 / 12.0) * (c(1.0) - s * c(1.0 / 30.0) * (c(1.0) - s * c(1.0 / 56.0))));
-    let (x, z) = (x * cos - z * sin, x * sin + z * cos);
-    let scale = c(1.5) - c(0.5) * (x * x + z * z);
-    [x * scale, z * scale]
-}
-
-impl Engine for PlanarEngine {
-    fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        self.voltages.clear();
+        self.voltages.extend_from_slice(voltages);
         let m = self.motors_per_actuator;
         let state = &mut self.state;
         for (joints, volts) in state.motor_voltages.chunks_exact_mut(m).zip(voltages) {
@@ -415,24 +388,29 @@ impl Engine for PlanarEngine {
         for (volts, gain) in state.motor_voltages.iter_mut().zip(&self.gains) {
             *volts *= gain;
         }
-        let lag = f64x2::splat(self.joint.damping_time);
-        let first = &self.rungs[0];
-        let mut inner = [first.angle, first.motion[0]].map(|value| f64x2::splat(value.to_array()[0]));
-        let mut check = f64x2::ZERO;
         for (k, rung) in self.rungs.iter_mut().enumerate().skip(1) {
-            // The joint of the left arm's body is on its right, that of the right arm's on its left.
-            let (left, right) = (self.root.checked_sub(k), self.root + k - 1);
+            let (left, right) = joints_of(k, self.root);
             let volts = |joint: Option<usize>| joint.and_then(|i| state.motor_voltages.get(i)).copied().unwrap_or(0.0);
             // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
-            let per_volt = self.joint.rest_angle_per_volt;
-            rung.rest_angle = f64x2::new([per_volt * volts(left), -per_volt * volts(Some(right))]);
+            rung.volts = f64x2::new([volts(left), -volts(Some(right))]);
+            rung.rest_angle = f64x2::splat(self.joint.rest_angle_per_volt) * rung.volts;
             if !self.rest_angles.is_empty() {
                 let rest = |joint: Option<usize>| joint.and_then(|i| self.rest_angles.get(i)).copied().unwrap_or(0.0);
                 rung.rest_angle += f64x2::new([rest(left), -rest(Some(right))]);
             }
+        }
+    }
+
+    /// Reads the joints' angles and rates, and computes their torques.
+    fn read_joints(&mut self) {
+        let state = &mut self.state;
+        let lag = f64x2::splat(self.joint.damping_time);
+        let first = &self.rungs[0];
+        let mut inner = [first.angle, first.motion[0]].map(|value| f64x2::splat(value.to_array()[0]));
+        for (k, rung) in self.rungs.iter().enumerate().skip(1) {
+            let (left, right) = joints_of(k, self.root);
             let (angle, rate) = (rung.angle - inner[0], rung.motion[0] - inner[1]);
             inner = [rung.angle, rung.motion[0]];
-            check += f64x2::ZERO * (angle + rate);
             let mut torque = rung.stiffness * (angle - rung.rest_angle + lag * rate);
             if let Some(beyond) = &self.beyond {
                 torque -= beyond.now(k, rung, angle - rung.rest_angle, rate);
@@ -445,19 +423,71 @@ impl Engine for PlanarEngine {
                 (state.angles[right], state.rates[right], state.torques[right]) = (-angle[1], -rate[1], torque[1]);
             }
         }
-        let mut sum = check.reduce_add();
-        sum += 0.0 * (self.centre[0] + self.centre[1] + self.velocity[0] + self.velocity[1]);
-        if sum == 0.0 {
+    }
+
+    /// Fails if a coordinate is no number.
+    fn check_finite(&mut self) -> Result<(), EngineError> {
+        self.read_joints();
+        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !(a + r).is_finite());
+        if bad.is_none() && self.centre.iter().chain(&self.velocity).all(|value| value.is_finite()) {
+            self.finite = true;
             return Ok(());
         }
-        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !(a + r).is_finite());
         let what =
             bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
         let time = self.step as f64 * self.time_step;
         Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: self.stable_step })
     }
 
-    fn joints(&self) -> &JointState {
+    /// Sums of [`turns`](Engine::turns), from the left joint to the right one.
+    fn sum_turns(&mut self) {
+        let (mut work, mut squares) = (0.0, 0.0);
+        let mut add = |rung: &Rung, lane: usize| {
+            let [volts, turn] = [rung.volts, rung.turn].map(|lanes| lanes.as_array()[lane]);
+            work += volts * turn;
+            squares += turn * turn;
+        };
+        let Some((_, arms)) = self.rungs.split_first() else { return };
+        arms.iter().take(self.root).rev().for_each(|rung| add(rung, 0));
+        arms.iter().take(self.count - 1 - self.root).for_each(|rung| add(rung, 1));
+        self.turns = [work, squares];
+    }
+}
+
+/// What the next rung finds of `value` at its inner ends: both bodies of the rung after the root hang on the root.
+#[inline(always)]
+fn outwards(value: f64x2, rung: usize) -> f64x2 {
+    if rung == 0 { f64x2::splat(value.to_array()[0]) } else { value }
+}
+
+/// Gravity along x and z (cm/s²) of a floor that rises by `slope` (rad) along +x, in its axes.
+fn pull(gravity: f64, slope: f64) -> [f64; 2] {
+    if slope == 0.0 { [0.0, -gravity] } else { [-gravity * slope.sin(), -gravity * slope.cos()] }
+}
+
+/// Rung and lane of body `i` of a chain with this root.
+fn place(i: usize, root: usize) -> (usize, usize) {
+    if i <= root { (root - i, 0) } else { (i - root, 1) }
+}
+
+/// The joints at the reference points of rung `k` of a chain with this root. That of the left arm's body is on its right, that of the right
+/// arm's, which may have ended, on its left.
+fn joints_of(k: usize, root: usize) -> (Option<usize>, usize) {
+    (root.checked_sub(k), root + k - 1)
+}
+
+fn put(lanes: &mut f64x2, lane: usize, value: f64) {
+    lanes.as_mut_array()[lane] = value;
+}
+
+impl Engine for PlanarEngine {
+    fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        self.apply(voltages);
+        if self.finite { Ok(()) } else { self.check_finite() }
+    }
+
+    fn joints(&mut self) -> &JointState {
+        self.read_joints();
         &self.state
     }
 
@@ -504,10 +534,9 @@ impl Engine for PlanarEngine {
                 let right = [left[0] + vector[0], left[1] + vector[1]];
                 let (rung, lane) = place(i, engine.root);
                 let reference = if i < engine.root { right } else { left };
-                for corner in floor.of_body(rung, lane) {
-                    let impulse = corner.impulse(&engine.law);
+                for [arm, impulse] in floor.of_body(rung, lane, &engine.law) {
                     if impulse[1] > 0.0 {
-                        let position = [0, 1].map(|k| reference[k] + corner.arm[k]);
+                        let position = [0, 1].map(|k| reference[k] + arm[k]);
                         contacts.push(Contact { link: i, position, force: impulse.map(|part| part / engine.time_step) });
                     }
                 }
@@ -520,28 +549,21 @@ impl Engine for PlanarEngine {
     fn advance(&mut self) -> Result<(), EngineError> {
         let h = self.time_step;
         let share = self.weight * h;
-        self.turn();
-        self.load_torques(share);
-        let pull = self.pull.map(|part| f64x2::splat(share * part));
-        for rung in &mut self.rungs {
-            let [rate, x, z] = rung.motion;
-            let mut momentum = [rung.inertia * rate, rung.mass * (x + pull[0]), rung.mass * (z + pull[1])];
-            if let Some(beyond) = self.beyond.as_ref().filter(|beyond| beyond.has_drag()) {
-                let drag = beyond.drag(rung);
-                (0..3).for_each(|k| momentum[k] += f64x2::splat(share) * drag[k]);
-            }
-            rung.load(momentum);
-        }
+        self.begin_step(share);
         if let Some(floor) = self.floor.as_ref().filter(|floor| floor.is_viscous()) {
-            let height = self.root_position(0.5 * h)[1];
+            let (height, _) = self.root_over_floor();
             floor.push_viscous(&mut self.rungs, height, share);
         }
         self.solve_step(share)?;
         let (step, per_weight) = (f64x2::splat(h), f64x2::splat(1.0 / self.weight));
         let (mut momentum, mut changed) = ([f64x2::ZERO; 2], f64x2::ZERO);
-        for rung in &mut self.rungs {
+        let mut inner = [f64x2::ZERO; 2];
+        for (k, rung) in self.rungs.iter_mut().enumerate() {
             let mean = rung.mean_of_centre();
+            let before = rung.angle;
             rung.angle += step * mean[0];
+            rung.turn = (rung.angle - inner[1]) - (before - inner[0]);
+            inner = [outwards(before, k), outwards(rung.angle, k)];
             let change: Spatials = std::array::from_fn(|k| (mean[k] - rung.motion[k]) * per_weight);
             for (motion, change) in rung.motion.iter_mut().zip(change) {
                 *motion += change;
@@ -550,7 +572,9 @@ impl Engine for PlanarEngine {
             momentum[0] += rung.share * rung.motion[1];
             momentum[1] += rung.share * rung.motion[2];
         }
-        self.numerical_loss += (self.weight - 0.5) * changed.reduce_add();
+        let changed = changed.reduce_add();
+        self.finite = changed.is_finite();
+        self.numerical_loss += (self.weight - 0.5) * changed;
         if !self.clamped() {
             for (k, share) in momentum.into_iter().enumerate() {
                 let after = share.reduce_add();
@@ -558,8 +582,13 @@ impl Engine for PlanarEngine {
                 self.velocity[k] = after;
             }
         }
+        self.sum_turns();
         self.step += 1;
         Ok(())
+    }
+
+    fn turns(&self) -> [f64; 2] {
+        self.turns
     }
 
     fn midpoint(&self) -> bool {
@@ -588,14 +617,14 @@ impl Engine for PlanarEngine {
         state.extend(self.velocity);
         state.extend(bodies().flat_map(|i| [0, 1].map(|k| self.of_body(i, |rung| rung.along[k]))));
         state.extend(bodies().map(|i| self.of_body(i, |rung| rung.posed)));
-        state.extend(self.floor.iter().flat_map(Floor::saved));
+        state.extend(self.floor.iter().flat_map(|floor| floor.saved()));
         state.extend(self.beyond.iter().flat_map(Beyond::saved));
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
         let count = self.count;
-        let corners = self.floor.iter().flat_map(Floor::saved).count();
+        let corners = self.floor.iter().flat_map(|floor| floor.saved()).count();
         let memory = self.beyond.iter().flat_map(Beyond::saved).count();
         if state.len() != 7 * count + 4 + corners + memory || state.iter().any(|value| !value.is_finite()) {
             return Err(EngineError::State);
@@ -621,6 +650,7 @@ impl Engine for PlanarEngine {
         if let Some(beyond) = &mut self.beyond {
             beyond.restore(memory);
         }
+        self.finite = false;
         self.step = step;
         Ok(())
     }

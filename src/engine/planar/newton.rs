@@ -46,7 +46,7 @@ impl PlanarEngine {
     }
 
     fn solve_with(&mut self, floor: &mut Floor, law: &Law) -> Result<bool, EngineError> {
-        let (height, velocity) = (self.root_position(0.5 * self.time_step)[1], self.root_velocity());
+        let (height, velocity) = self.root_over_floor();
         if !floor.find(&self.rungs, height, velocity, law) {
             return Ok(false);
         }
@@ -54,7 +54,7 @@ impl PlanarEngine {
         if self.friction == FrictionModel::Coulomb {
             for _ in 0..LARGEST_LIFTS {
                 let mut changed = 0.0_f64;
-                floor.near(&self.rungs, |corner, mean| changed = changed.max(corner.take_off_lift(mean, law)));
+                floor.near(&self.rungs, |corners, mean| changed = changed.max(corners.take_off_lift(mean, law)));
                 if changed < LIFT_ENOUGH {
                     break;
                 }
@@ -72,9 +72,9 @@ impl PlanarEngine {
         let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
         for iteration in 1..=largest {
             self.iterations += 1;
-            solve(&mut self.rungs, Hold::Free, Some((floor, law)));
+            solve(&mut self.rungs, Hold::Free, floor.inwards(), law);
             let mut agrees = true;
-            floor.near(&self.rungs, |corner, mean| agrees &= corner.agrees(mean, law));
+            floor.near(&self.rungs, |corners, mean| agrees &= corners.agrees(mean, law));
             if agrees {
                 return Ok(());
             }
@@ -83,13 +83,12 @@ impl PlanarEngine {
                 Search::Part => {}
                 Search::Whole => {
                     // After the first solution: its states were a guess, and any motion will do for an iterate.
-                    floor.near(&self.rungs, |corner, mean| corner.accept(mean, law));
+                    floor.near(&self.rungs, |corners, mean| corners.accept(mean));
                     for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
                         *iterate = rung.mean;
                     }
                 }
             }
-            floor.mark();
         }
         let time = self.step as f64 * self.time_step;
         Err(EngineError::NotConverged { iterations: largest, step: self.step, time })
@@ -116,9 +115,12 @@ impl PlanarEngine {
         }
         let (metric, kinetic) = (metric.reduce_add(), kinetic.reduce_add());
         let mut end = 0.0;
-        floor.near(&self.rungs, |corner, mean| end += corner.aim(mean, law));
+        floor.near(&self.rungs, |corners, mean| {
+            let [a, b] = corners.aim(mean, law).to_array();
+            end = end + a + b;
+        });
         let slope_at = |t: f64| {
-            let (along, slope) = floor.sum(|corner| corner.search(t, law));
+            let [along, slope] = floor.sum(|corners| corners.search(t, law));
             (end - (1.0 - t) * metric - along, metric - slope)
         };
         let start = -slope_at(0.0).0;
@@ -154,7 +156,7 @@ impl PlanarEngine {
                 *from += share * (*to - *from);
             }
         }
-        floor.near(&self.rungs, |corner, _| corner.go(found, law));
+        floor.near(&self.rungs, |corners, _| corners.go(found, law));
         Search::Part
     }
 }

@@ -10,12 +10,15 @@
 use wide::f64x2;
 
 use super::contact::Law;
-use super::floor::Floor;
+use super::floor::Inwards;
 
 /// Turn, x, z.
-pub(super) type Spatial = [f64; 3];
+type Spatial = [f64; 3];
 /// The same of two bodies.
 pub(super) type Spatials = [f64x2; 3];
+
+/// The largest turn (rad) for which the series in [`turned`] are exact to the last digit.
+const LARGEST_SERIES: f64 = 0.1;
 
 /// Two bodies: what stays, their state, and what the step at hand needs.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,12 +40,17 @@ pub(super) struct Rung {
     pub(super) angle: f64x2,
     /// Rate (rad/s) and velocity of the centre of mass (cm/s).
     pub(super) motion: Spatials,
+    /// Voltage on the joint, negative on the right arm (V), and how far the joint turned in the last step (rad), both seen from the root.
+    pub(super) volts: f64x2,
+    pub(super) turn: f64x2,
     /// Angle at which the joint's spring is at rest, body towards the root to this one (rad).
     pub(super) rest_angle: f64x2,
     /// The angle that `along`, the direction from left end to right one, is of, and the other end less the reference point (cm).
     pub(super) posed: f64x2,
     pub(super) along: [f64x2; 2],
     pub(super) across: [f64x2; 2],
+    /// The centres of mass less the reference points (cm).
+    half: [f64x2; 2],
     /// Momentum about the reference point that the mean motion is to have, and the joint's part of it.
     pub(super) momentum: Spatials,
     pub(super) torque: f64x2,
@@ -60,9 +68,35 @@ impl Rung {
         Self { implicit: f64x2::ONE, middle: f64x2::HALF, along: [f64x2::ONE, f64x2::ZERO], ..Self::default() }
     }
 
-    /// Velocity of the centres of mass relative to the reference points, for a unit turn, is (−z, x) of this.
-    fn half(&self) -> [f64x2; 2] {
-        self.across.map(|part| part * self.middle)
+    /// Puts the links where `along` says that they point.
+    #[inline(always)]
+    pub(super) fn lay(&mut self) {
+        self.across = self.along.map(|along| self.reach * along);
+        self.half = self.across.map(|part| part * self.middle);
+    }
+
+    /// Turns the links to the angles `to` (rad), on from where they were by the series of sine and cosine, which is several times faster than
+    /// computing both anew, unless they shall be `exact` or turn far.
+    #[inline(always)]
+    pub(super) fn turn_to(&mut self, to: f64x2, exact: bool) {
+        let by = to - self.posed;
+        self.posed = to;
+        let far = by.abs().simd_gt(f64x2::splat(LARGEST_SERIES)).any();
+        self.along = if far || exact { direction(to) } else { turned(self.along, by) };
+        self.lay();
+    }
+
+    /// Sets the joints' parts of the step's right side, −`share` (s) of their torques at the angles as they are, with the bodies towards the
+    /// root at `inner` (rad). The implicit part adds what the mean rate makes.
+    #[inline(always)]
+    pub(super) fn load_torque(&mut self, share: f64x2, inner: f64x2) {
+        self.torque = share * self.stiffness * (self.angle - inner - self.rest_angle);
+    }
+
+    /// Velocity of the other ends relative to the reference points.
+    #[inline(always)]
+    pub(super) fn velocity_across(&self) -> [f64x2; 2] {
+        [-self.motion[0] * self.across[1], self.motion[0] * self.across[0]]
     }
 
     /// Mean motion of the other ends.
@@ -82,7 +116,7 @@ impl Rung {
     #[inline(always)]
     pub(super) fn of_centre(&self, motion: Spatials) -> Spatials {
         let [turn, x, z] = motion;
-        let half = self.half();
+        let half = self.half;
         [turn, x - turn * half[1], z + turn * half[0]]
     }
 
@@ -90,23 +124,42 @@ impl Rung {
     #[inline(always)]
     pub(super) fn load(&mut self, about_centre: Spatials) {
         let [turn, x, z] = about_centre;
-        let half = self.half();
+        let half = self.half;
         self.momentum = [turn + half[0] * z - half[1] * x, x, z];
     }
 }
 
+/// Directions of two angles.
+pub(super) fn direction(angle: f64x2) -> [f64x2; 2] {
+    let angle = angle.to_array();
+    [f64x2::new(angle.map(f64::cos)), f64x2::new(angle.map(f64::sin))]
+}
+
+/// Two directions turned by small angles (rad), at unit length.
+#[inline(always)]
+fn turned([x, z]: [f64x2; 2], by: f64x2) -> [f64x2; 2] {
+    let c = f64x2::splat;
+    let s = by * by;
+    let sin =
+        by * (c(1.0) - s * c(1.0 / 6.0) * (c(1.0) - s * c(0.05) * (c(1.0) - s * c(1.0 / 42.0) * (c(1.0) - s * c(1.0 / 72.0)))));
+    let cos = c(1.0) - s * c(0.5) * (c(1.0) - s * c(1.0 / 12.0) * (c(1.0) - s * c(1.0 / 30.0) * (c(1.0) - s * c(1.0 / 56.0))));
+    let (x, z) = (x * cos - z * sin, x * sin + z * cos);
+    let scale = c(1.5) - c(0.5) * (x * x + z * z);
+    [x * scale, z * scale]
+}
+
 /// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms.
 #[derive(Debug, Clone, Copy, Default)]
-struct Arms {
-    inertia: [f64x2; 6],
-    force: Spatials,
+pub(super) struct Arms {
+    pub(super) inertia: [f64x2; 6],
+    pub(super) force: Spatials,
 }
 
 /// The same of one body.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Articulated {
-    pub(super) inertia: [f64; 6],
-    pub(super) force: Spatial,
+struct Articulated {
+    inertia: [f64; 6],
+    force: Spatial,
 }
 
 impl Arms {
@@ -117,11 +170,11 @@ impl Arms {
         let [wx, wz] = [-rung.across[1], rung.across[0]];
         let [_, i01, i02, i11, i12, i22] = *inertia;
         let (bx, bz) = (i11 * wx + i12 * wz, i12 * wx + i22 * wz);
-        let (hx, hz) = (rung.middle * wx, rung.middle * wz);
+        let [hx, hz] = rung.half;
         let (mx, mz) = (rung.mass * hx, rung.mass * hz);
-        inertia[0] += (wx * (i01 + i01 + bx) + wz * (i02 + i02 + bz)) + (rung.inertia + mx * hx + mz * hz);
-        inertia[1] += bx + mx;
-        inertia[2] += bz + mz;
+        inertia[0] += (wx * (i01 + i01 + bx) + wz * (i02 + i02 + bz)) + (rung.inertia + mz * hz + mx * hx);
+        inertia[1] += bx - mz;
+        inertia[2] += bz + mx;
         inertia[3] += rung.mass;
         inertia[5] += rung.mass;
         force[0] += (wx * force[1] + wz * force[2]) + rung.momentum[0];
@@ -130,13 +183,10 @@ impl Arms {
     }
 
     /// Adds what corners do to the bodies of a rung.
-    fn touch(&mut self, by: [Articulated; 2]) {
-        for (k, inertia) in self.inertia.iter_mut().enumerate() {
-            *inertia += f64x2::new([by[0].inertia[k], by[1].inertia[k]]);
-        }
-        for (k, force) in self.force.iter_mut().enumerate() {
-            *force += f64x2::new([by[0].force[k], by[1].force[k]]);
-        }
+    #[inline(always)]
+    fn touch(&mut self, by: &Self) {
+        (0..6).for_each(|k| self.inertia[k] += by.inertia[k]);
+        (0..3).for_each(|k| self.force[k] += by.force[k]);
     }
 
     /// What of it is felt through the joints at the rung's reference points.
@@ -162,10 +212,8 @@ impl Arms {
     /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
     fn at_root(&self, root: &Rung) -> Articulated {
         let lane = |value: f64x2, lane: usize| value.as_array()[lane];
-        let mut right = Self {
-            inertia: self.inertia.map(|value| f64x2::splat(lane(value, 1))),
-            force: self.force.map(|value| f64x2::splat(lane(value, 1))),
-        };
+        let mut right = *self;
+        right.inertia.iter_mut().chain(&mut right.force).for_each(|value| *value = f64x2::splat(lane(*value, 1)));
         right.take(root);
         let both = |left: f64x2, right: f64x2| lane(left, 0) + lane(right, 0);
         Articulated {
@@ -203,17 +251,18 @@ pub(super) enum Hold {
     Hinged,
 }
 
-/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. A chain without `floor` touches nothing.
-pub(super) fn solve(rungs: &mut [Rung], hold: Hold, floor: Option<(&Floor, &Law)>) {
+/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as
+/// their states say.
+pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut floor: Inwards, law: &Law) {
     let Some((root, arms)) = rungs.split_first_mut() else { return };
     let mut chain = Arms::default();
-    for (k, rung) in arms.iter_mut().enumerate().rev() {
+    let mut k = arms.len();
+    for rung in arms.iter_mut().rev() {
         chain.take(rung);
-        if let Some((floor, law)) = floor
-            && floor.touches(k + 1)
-        {
-            chain.touch(floor.of_rung(k + 1, law));
+        if let Some(by) = floor.take(k, law) {
+            chain.touch(&by);
         }
+        k -= 1;
         chain.through_joints(rung);
     }
     let motion = if hold == Hold::Clamped {
@@ -224,12 +273,9 @@ pub(super) fn solve(rungs: &mut [Rung], hold: Hold, floor: Option<(&Floor, &Law)
         [(whole.force[0] + torque) / (whole.inertia[0] + implicit), 0.0, 0.0]
     } else {
         let mut whole = chain.at_root(root);
-        if let Some((floor, law)) = floor
-            && floor.touches(0)
-        {
-            let [by, _] = floor.of_rung(0, law);
-            (0..6).for_each(|k| whole.inertia[k] += by.inertia[k]);
-            (0..3).for_each(|k| whole.force[k] += by.force[k]);
+        if let Some(by) = floor.take(0, law) {
+            (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
+            (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
         }
         whole.motion()
     };

@@ -8,9 +8,9 @@
 use wide::f64x2;
 
 use super::contact::{Grip, Law};
-use super::floor::Floor;
-use super::recursion::{Rung, solve};
-use super::{Engine, EngineError, PlanarEngine, direction};
+use super::floor::{Floor, Inwards};
+use super::recursion::{Rung, direction, solve};
+use super::{Engine, EngineError, PlanarEngine, outwards};
 use crate::model::Mount;
 
 /// Rigid motions that cost no energy are held by this share of the inertia (1/s²).
@@ -35,7 +35,7 @@ impl PlanarEngine {
         }
         self.prepare(voltages)?;
         let dynamic = self.rungs.clone();
-        let mut grips = vec![[Grip::new(0.0); 2]; dynamic.len()];
+        let mut grips = vec![Grip::new(f64x2::ZERO); dynamic.len()];
         if let Some(floor) = &mut self.floor {
             floor.swap_grips(&mut grips);
         }
@@ -46,6 +46,7 @@ impl PlanarEngine {
             rung.motion = Default::default();
         }
         self.velocity = [0.0; 2];
+        self.finite = false;
         let settled = self.settle_in_steps(&dynamic);
         for (rung, real) in self.rungs.iter_mut().zip(&dynamic) {
             (rung.mass, rung.inertia, rung.implicit) = (real.mass, real.inertia, real.implicit);
@@ -68,10 +69,14 @@ impl PlanarEngine {
             for (rung, body) in self.rungs.iter_mut().zip(bodies) {
                 rung.posed = rung.angle;
                 rung.along = direction(rung.angle);
-                rung.across = rung.along.map(|along| rung.reach * along);
+                rung.lay();
                 rung.load([f64x2::ZERO, body.mass * pull[0], body.mass * pull[1]]);
             }
-            self.load_torques(1.0);
+            let mut inner = f64x2::ZERO;
+            for (k, rung) in self.rungs.iter_mut().enumerate() {
+                rung.load_torque(-f64x2::ONE, inner);
+                inner = outwards(rung.angle, k);
+            }
             if let Some(beyond) = &self.beyond {
                 let mut inner = f64x2::splat(self.rungs[0].angle.to_array()[0]);
                 for rung in self.rungs.iter_mut().skip(1) {
@@ -80,7 +85,7 @@ impl PlanarEngine {
                 }
             }
             if !self.solve_on_floor(&law)? {
-                solve(&mut self.rungs, self.hold, None);
+                solve(&mut self.rungs, self.hold, Inwards::default(), &law);
             }
             let turns = self.rungs.iter().flat_map(|rung| rung.mean[0].to_array());
             let largest = turns.map(f64::abs).fold(0.0, f64::max);
