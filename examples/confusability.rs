@@ -92,7 +92,7 @@ fn main() {
             .iter()
             .filter_map(|(id, name, value)| {
                 let [low, high] = range(&d, id, name)?;
-                let holds = low <= *value && *value <= high;
+                let holds = (low..=high).contains(value);
                 Some((holds, if holds { "yes".into() } else { format!("no: {value:.4}, not {low:.4} to {high:.4}") }))
             })
             .collect();
