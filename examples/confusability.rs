@@ -5,7 +5,8 @@
 //! ```
 //!
 //! The data come from tests/hidden: 11 runs and 37 s of motion of a cantilever, or, for ids after `floor:`, 10 runs and 12 s of motion of a robot
-//! on the floor. `floor` stands for all effects that can be hidden there, `a+b` for two at once.
+//! on the floor. `floor` stands for all effects that can be hidden there, `turning` for the same with a robot that nothing keeps in its plane
+//! (ids after `turning:`), `a+b` for two at once.
 
 #[path = "../tests/hidden/generator.rs"]
 mod generator;
@@ -29,16 +30,16 @@ type Truth = (String, &'static str, f64);
 
 /// Writes the data of a case: the trace (mm) of what is hidden in them, and the true values.
 fn hide(folder: &Path, id: &str, size: usize, seed: u64, noise_mm: f64) -> (f64, Vec<Truth>) {
-    if let Some(id) = id.strip_prefix("floor:") {
-        let clean = ground::nominal();
-        if id == "none" {
-            ground::write(folder, clean, noise_mm, seed);
-            return (0.0, Vec::new());
-        }
-        let (floor, parameters) = ground::hide(id, size, seed);
+    if let Some((place, id)) = id.split_once(':') {
+        let (mut floor, parameters) =
+            if id == "none" { (ground::Floor::default(), Vec::new()) } else { ground::hide(id, size, seed) };
+        floor.in_plane = place != "turning";
         let films = ground::film(&floor);
         ground::write(folder, &films, noise_mm, seed);
-        return (ground::trace(&films, clean), parameters.into_iter().map(|(name, value)| (id.into(), name, value)).collect());
+        return (
+            ground::trace(&films, ground::nominal()),
+            parameters.into_iter().map(|(name, value)| (id.into(), name, value)).collect(),
+        );
     }
     let effects: Vec<&str> = id.split('+').filter(|id| *id != "none").collect();
     let case = Case { effects: &effects, size, noise_mm, seed, outliers: false, damaged: false, m: 3 };
@@ -54,10 +55,12 @@ fn main() {
     let seeds = numbers(arguments.get(2), &[1_u64]);
     let noises = numbers(arguments.get(3), &[0.05]);
     let all = || ["none"].into_iter().chain(INSIDE.iter().copied()).chain(OUTSIDE.iter().copied()).map(String::from).collect();
-    let floor = || ["none"].into_iter().chain(ground::INSIDE.map(|sizes| sizes.id)).map(|id| format!("floor:{id}")).collect();
+    let floor = |place: &str| -> Vec<String> {
+        ["none"].into_iter().chain(ground::INSIDE.map(|sizes| sizes.id)).map(|id| format!("{place}:{id}")).collect()
+    };
     let ids: Vec<String> = match arguments.get(4).map(String::as_str) {
         None => all(),
-        Some("floor") => floor(),
+        Some(place @ ("floor" | "turning")) => floor(place),
         Some(list) => list.split(',').map(String::from).collect(),
     };
     println!(
@@ -119,7 +122,7 @@ fn main() {
 
 /// Nothing where nothing is hidden, `unexplained` of what is in no library, and otherwise every hidden cause by name.
 fn is_expected(d: &Diagnosis, id: &str) -> bool {
-    let id = id.strip_prefix("floor:").unwrap_or(id);
+    let id = id.split_once(':').map_or(id, |(_, id)| id);
     match id {
         "none" => d.verdict == Verdict::None,
         _ if OUTSIDE.contains(&id) => d.verdict == Verdict::Unexplained,

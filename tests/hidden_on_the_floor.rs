@@ -10,7 +10,7 @@ mod ground;
 #[path = "hidden/judge.rs"]
 mod judge;
 
-use ground::{Film, INSIDE, film, hide, nominal, trace, write};
+use ground::{Film, Floor, INSIDE, film, hide, nominal, trace, write};
 use judge::{diagnosed, holds, is_right, long, names};
 use sfers::diagnose::diagnosis::Verdict;
 use sfers::diagnose::verdict::Outcome;
@@ -57,4 +57,13 @@ fn nothing_is_found_where_only_the_engines_differ() {
     assert_eq!((d.verdict, names(d)), (Verdict::None, vec![]));
     // Bullet's contact and the planar engine's differ by a fifth of the noise or so.
     assert!(d.baseline.rmse_mm < 1.1 * NOISE_MM, "{}", d.baseline.rmse_mm);
+}
+
+/// What a robot that nothing keeps in its plane does is an effect of its own, several times larger than what the engines' planar motion differs by.
+#[test]
+fn left_to_itself_bullets_robot_turns() {
+    let turning = film(&Floor { in_plane: false, ..Floor::default() });
+    let trace = trace(&turning, nominal());
+    // Seen: 0.021 mm.
+    assert!((0.01..0.04).contains(&trace), "{trace} mm");
 }

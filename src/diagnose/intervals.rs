@@ -37,6 +37,7 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
     };
     let (mut ends, mut correlations) = (Vec::new(), Vec::new());
     for k in 0..n {
+        (search.progress)(&format!("the interval of {}", name(k)));
         let free = &search.bench.plant.candidates()[model.terms[places[k].0].candidate].parameters[places[k].1];
         let x = model.terms[places[k].0].x[places[k].1];
         let spread = (naive[(k, k)] * inflation[k]).sqrt();
@@ -46,7 +47,7 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
             if n > 1 && reach.is_finite() && reach > 0.0 {
                 let to = (x + sign * reach).clamp(free.bounds[0], free.bounds[1]);
                 if (to - x).abs() > 0.5 * reach
-                    && let Ok(chi2) = search.bench.profile(model, places[k], to, &search.split.fit)
+                    && let Ok(chi2) = search.bench.profile(&along(search, model, &naive, k, to), places[k], &search.split.fit)
                 {
                     let grown = (chi2 - scored.fit.chi2) / inflation[k];
                     let asked = CHI2_95 * ((to - x) / reach).powi(2);
@@ -69,6 +70,20 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
     }
     let sizes = model.terms.iter().map(|term| term.x.len()).collect();
     Ok(Intervals { ends, sizes, correlations, condition: condition(&scored.fit.information) })
+}
+
+/// The model with coordinate `k` at `to` and all others where they would be best if the model were linear, within their bounds.
+fn along(search: &Search, model: &Model, covariance: &DMatrix<f64>, k: usize, to: f64) -> Model {
+    let mut moved = model.clone();
+    let places = places(model);
+    let (term, parameter) = places[k];
+    let by = to - model.terms[term].x[parameter];
+    for (j, (term, parameter)) in places.into_iter().enumerate() {
+        let [low, high] = search.bench.plant.candidates()[model.terms[term].candidate].parameters[parameter].bounds;
+        let x = &mut moved.terms[term].x[parameter];
+        *x = if j == k { to } else { (*x + covariance[(j, k)] / covariance[(k, k)] * by).clamp(low, high) };
+    }
+    moved
 }
 
 /// How far each coordinate moves with the discretisation, to the next coarser number of joints (if it was refined) and with the time step, and with constants that are

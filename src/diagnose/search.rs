@@ -435,21 +435,22 @@ impl Search<'_> {
                 let mut model = best.model().clone();
                 let term = model.terms.remove(index);
                 (self.progress)(&format!("doing without {}", self.id(term.candidate)));
-                self.fitted(&model)
+                self.ranked(&model)
             };
             // What the discretisation could do as well goes first.
             let plant = self.bench.plant;
             let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
             if let Some(idle) = idle {
-                best = shorter(idle)?;
+                best = self.fitted(shorter(idle)?.model())?;
                 continue;
             }
             let shorter = (0..best.model().terms.len()).map(shorter).collect::<Result<Vec<_>, _>>()?;
-            let least = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total()));
-            match least {
-                Some(least) if !self.is_worth(&best, &least) && !self.is_seen_by_fit(&best, &least) => best = least,
-                _ => return Ok(best),
+            let Some(least) = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(best) };
+            let least = self.fitted(least.model())?;
+            if self.is_worth(&best, &least) || self.is_seen_by_fit(&best, &least) {
+                return Ok(best);
             }
+            best = least;
         }
     }
 

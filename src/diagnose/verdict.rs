@@ -102,7 +102,6 @@ pub fn diagnose(
         best = coarse.clone();
     }
 
-    progress("intervals");
     let mut numerics = numerics(&search, &best)?;
     // What is left may pull at the causes: by no more than its share of what they explain.
     let free = best.model().terms.iter().flat_map(|term| {
@@ -113,6 +112,7 @@ pub fn diagnose(
         *numerics = numerics.hypot(reach * unexplained_fraction.sqrt());
     }
     let intervals = intervals_of(&search, &best, &numerics)?;
+    progress("what could stand in the place of what was found");
     let tied = ties(&search, &best, &replaced, coarse_total);
     let mut effects = Vec::new();
     if refined {
@@ -291,6 +291,7 @@ fn adopted(
     tied: &[(usize, Trial)],
 ) -> Result<Adopted, String> {
     let candidate = &search.bench.plant.candidates()[term.candidate];
+    (search.progress)(&format!("what {} is worth", candidate.id));
     let mut without = best.model().clone();
     without.terms.remove(index);
     let without = search.fitted(&without)?;
