@@ -21,10 +21,13 @@ use sfers::model::Robot;
 use super::generator::effects::{Random, loop_width, put};
 use super::generator::protocol::Plays;
 
-/// Bullet's step (s): half of what its explicit torque law stands.
-const STEP: f64 = 2e-5;
-/// Rows are so many steps apart, 5 ms.
+/// Time between rows (s).
+const ROW: f64 = 5e-3;
+/// Bullet's steps per row, of 2e-5 s: half of what its explicit torque law stands.
 const STEPS_PER_ROW: usize = 250;
+/// The same where impacts return something. What a foot's load adds to its speed in a step is reflected as well if it is more than 0.2 cm/s (7000 dyn
+/// on the 0.35 g of a corner: 0.4 cm/s in 2e-5 s): feet under load chatter, and the robot creeps by half a millimetre a second. At 5e-6 s that is gone.
+const STEPS_PER_ROW_WITH_RESTITUTION: usize = 1000;
 const ROWS: usize = 241;
 /// Rows that the robot is left alone on the floor before a run.
 const REST: usize = 80;
@@ -206,19 +209,21 @@ pub fn film(hidden: &Floor) -> Vec<Film> {
 
 fn film_of(hidden: &Floor, wave: &Wave) -> Film {
     let robot = robot(hidden);
-    let mut engine = BulletEngine::new(&robot, STEP).expect("a robot for Bullet");
+    let steps_per_row = if hidden.restitution > 0.0 { STEPS_PER_ROW_WITH_RESTITUTION } else { STEPS_PER_ROW };
+    let h = ROW / steps_per_row as f64;
+    let mut engine = BulletEngine::new(&robot, h).expect("a robot for Bullet");
     let lengths: Vec<f64> = robot.segments().iter().map(|segment| segment.length).collect();
     let mut nodes = vec![0.0; 3 * (lengths.len() + 1)];
     let mut rates = nodes.clone();
     let mut plays: Vec<Plays> = (0..ACTUATORS).map(|_| Plays::new(hidden.hysteresis, 0.0)).collect();
     let mut film = Film::new();
-    for step in 0..=(REST + ROWS - 1) * STEPS_PER_ROW {
+    for step in 0..=(REST + ROWS - 1) * steps_per_row {
         // Bullet applies a torque over the step that follows: the voltage is that of the step's middle.
-        let t = (step as f64 + 0.5) * STEP - (REST * STEPS_PER_ROW) as f64 * STEP;
+        let t = (step as f64 + 0.5) * h - (REST * steps_per_row) as f64 * h;
         let volts: Vec<f64> =
             (0..ACTUATORS).map(|k| hidden.gains[k] * plays[k].follow(wave.volts(t - hidden.delay_s, k))).collect();
         engine.prepare(&volts).expect("a step");
-        if step % STEPS_PER_ROW == 0 && step >= REST * STEPS_PER_ROW {
+        if step % steps_per_row == 0 && step >= REST * steps_per_row {
             engine.nodes(&mut nodes, &mut rates).expect("where the nodes are");
             film.push(seen(hidden, &lengths, &nodes));
         }
@@ -280,7 +285,7 @@ pub fn write(folder: &Path, films: &[Film], noise_mm: f64, seed: u64) {
         MARKERS.iter().for_each(|(name, _)| _ = write!(table, ",{name}_x_mm,{name}_z_mm"));
         table.push('\n');
         for (row, markers) in film.iter().enumerate() {
-            let t = row as f64 * STEPS_PER_ROW as f64 * STEP;
+            let t = row as f64 * ROW;
             let _ = write!(table, "{t:.4}");
             (0..ACTUATORS).for_each(|k| _ = write!(table, ",{:.3}", wave.volts(t, k)));
             markers.iter().for_each(|value| _ = write!(table, ",{:.4}", value + noise_mm * random.normal()));

@@ -3,6 +3,9 @@
 //! ```text
 //! v⁺ = −e·v⁻, from 0.2 cm/s on
 //! ```
+//!
+//! Bullet's v⁻ holds what loads add to it within the step. A foot that bears N dyn chatters unless N·h/m, with the mass m that it
+//! moves, stays below 0.2 cm/s; the planar engine reflects the speed at the beginning of the step.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 
