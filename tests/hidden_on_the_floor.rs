@@ -59,7 +59,7 @@ fn nothing_is_found_where_only_the_engines_differ() {
     assert!(d.baseline.rmse_mm < 1.1 * NOISE_MM, "{}", d.baseline.rmse_mm);
 }
 
-/// What a robot that nothing keeps in its plane does is an effect of its own, several times larger than what the engines' planar motion differs by.
+/// What a robot that nothing keeps in its plane does is an effect of its own.
 #[test]
 fn left_to_itself_bullets_robot_turns() {
     let turning = film(&Floor { in_plane: false, ..Floor::default() });
