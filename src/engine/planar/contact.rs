@@ -26,6 +26,7 @@ const LEAST_BOUNCE: f64 = 0.2;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Law {
     time_step: f64,
+    per_step: f64,
     /// Share of the step's end in the mean motion.
     weight: f64,
     /// 1/R (g).
@@ -40,12 +41,12 @@ impl Law {
     }
 
     pub(super) fn new(time_step: f64, weight: f64, body_mass: f64) -> Self {
-        Self { time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false }
+        Self { time_step, per_step: 1.0 / time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false }
     }
 
     /// A frictionless floor for displacements: no velocity before, everything near.
     pub(super) fn statics(stiffness: f64) -> Self {
-        Self { time_step: 1.0, weight: 1.0, stiffness, frictionless: true }
+        Self { time_step: 1.0, per_step: 1.0, weight: 1.0, stiffness, frictionless: true }
     }
 }
 
@@ -156,7 +157,7 @@ impl Corners {
     #[inline(always)]
     pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
         let weight = f64x2::splat(law.weight);
-        let ahead = -gap / f64x2::splat(law.time_step);
+        let ahead = gap * f64x2::splat(-law.per_step);
         let end = if law.frictionless {
             ahead
         } else {
@@ -296,7 +297,17 @@ impl Corners {
     /// Whether the bodies' motion `mean` asks for the states that it was solved with; the impulses belong to it then.
     #[inline(always)]
     pub(super) fn agrees(&mut self, mean: &Spatials, law: &Law) -> bool {
-        (self.asked, self.impulse) = self.law(self.velocity_in(mean), law);
+        let v = self.velocity_in(mean);
+        if self.is_open() {
+            // Most corners near the floor do not touch it.
+            let pull = [self.target[0] - v[0], self.target[1] - v[1]];
+            let pressed = pull[1] + self.grip.friction * pull[0].abs();
+            if !(pressed.simd_gt(f64x2::ZERO) & self.near).any() {
+                (self.asked, self.impulse) = (self.touch, [f64x2::ZERO; 2]);
+                return true;
+            }
+        }
+        (self.asked, self.impulse) = self.law(v, law);
         !self.asked.0.simd_ne(self.touch.0).any()
     }
 

@@ -90,7 +90,7 @@ impl Floor {
     }
 
     /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.
-    #[inline(never)]
+    #[inline(always)]
     fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], rung: &Rung, from: &Reference, law: &Law) {
         let near = near & rung.mass.simd_gt(f64x2::ZERO);
         if !near.any() {

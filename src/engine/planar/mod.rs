@@ -49,7 +49,7 @@ use wide::f64x2;
 pub(super) use self::beyond::GAUSS;
 use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
-use self::floor::{Floor, Inwards, Surface, next};
+use self::floor::{Floor, Inwards, Surface};
 use self::recursion::{Hold, Rung, Spatials, direction, solve};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -63,7 +63,7 @@ pub(super) const LARGEST_FRICTION: f64 = 10.0;
 /// h (w − 1/2) ω/2 to the damping ratio, of second order in h.
 const NUMERICAL_DAMPING: f64 = 50.0;
 /// The links' directions are computed anew every so many steps, for turning them on loses a last digit at times.
-const EXACT_EVERY: u64 = 64;
+const EXACT_EVERY: u64 = 256;
 
 /// How sliding corners are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -167,6 +167,11 @@ impl PlanarEngine {
             put(&mut at.implicit, lane, implicit);
             frictions[rung][lane] = (segment.friction * robot.friction.ground).min(LARGEST_FRICTION);
         }
+        for rung in &mut rungs {
+            let half = rung.middle * rung.reach;
+            rung.inertia_at_reference = rung.inertia + rung.mass * half * half;
+        }
+        hang_levers(&mut rungs);
         // The base's centre stands at the origin, as in Bullet.
         let left = -0.5 * segments[0].length;
         let (mut at, mut moment) = (left, 0.0);
@@ -287,40 +292,26 @@ impl PlanarEngine {
         seen
     }
 
-    /// Mean over the mass of what each rung says of its reference points, walked from the root's, and of its part of what it says of its other
-    /// ends.
-    #[inline(always)]
-    fn mean<const N: usize>(&self, across: impl Fn(&Rung) -> [f64x2; N]) -> [f64; N] {
-        let (mut at, mut sum) = ([f64x2::ZERO; N], [f64x2::ZERO; N]);
-        for (k, rung) in self.rungs.iter().enumerate() {
-            let across = across(rung);
-            for i in 0..N {
-                sum[i] += rung.share * (at[i] + rung.middle * across[i]);
-                at[i] = next(at[i], across[i], k);
-            }
-        }
-        sum.map(|part| part.reduce_add())
-    }
-
     /// Where the root's reference point is (cm), as the links are turned, and its velocity (cm/s), from the rates and the velocity of the
     /// centre of mass.
     fn root_motion(&self) -> ([f64; 2], [f64; 2]) {
         if self.clamped() {
             return (self.centre, [0.0; 2]);
         }
-        let position = self.mean(|rung| rung.across);
-        let velocity = self.mean(|rung| rung.velocity_across());
-        ([0, 1].map(|k| self.centre[k] - position[k]), [0, 1].map(|k| self.velocity[k] - velocity[k]))
+        let (mut position, mut velocity) = ([f64x2::ZERO; 2], [f64x2::ZERO; 2]);
+        for rung in &self.rungs {
+            let [x, z] = rung.along.map(|along| rung.lever * along);
+            position = [position[0] + x, position[1] + z];
+            velocity = [velocity[0] - rung.motion[0] * z, velocity[1] + rung.motion[0] * x];
+        }
+        let sum = |of: [f64x2; 2], from: [f64; 2]| [0, 1].map(|k| from[k] - of[k].reduce_add());
+        (sum(position, self.centre), sum(velocity, self.velocity))
     }
 
     /// Height of a free robot's root (cm) in the middle of the step, as the links are turned, and its velocity at the start.
     fn root_over_floor(&self) -> (f64, [f64; 2]) {
-        let [height, x, z] = self.mean(|rung| {
-            let [x, z] = rung.velocity_across();
-            [rung.across[1], x, z]
-        });
-        let ahead = 0.5 * self.time_step;
-        (self.centre[1] + ahead * self.velocity[1] - height, [self.velocity[0] - x, self.velocity[1] - z])
+        let ([_, height], velocity) = self.root_motion();
+        (height + 0.5 * self.time_step * self.velocity[1], velocity)
     }
 
     /// Position and velocity of the left end of the chain, as the links are turned, with the state's velocities.
@@ -438,26 +429,25 @@ impl PlanarEngine {
         let time = self.step as f64 * self.time_step;
         Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: self.stable_step })
     }
-
-    /// Sums of [`turns`](Engine::turns), from the left joint to the right one.
-    fn sum_turns(&mut self) {
-        let (mut work, mut squares) = (0.0, 0.0);
-        let mut add = |rung: &Rung, lane: usize| {
-            let [volts, turn] = [rung.volts, rung.turn].map(|lanes| lanes.as_array()[lane]);
-            work += volts * turn;
-            squares += turn * turn;
-        };
-        let Some((_, arms)) = self.rungs.split_first() else { return };
-        arms.iter().take(self.root).rev().for_each(|rung| add(rung, 0));
-        arms.iter().take(self.count - 1 - self.root).for_each(|rung| add(rung, 1));
-        self.turns = [work, squares];
-    }
 }
 
 /// What the next rung finds of `value` at its inner ends: both bodies of the rung after the root hang on the root.
 #[inline(always)]
 fn outwards(value: f64x2, rung: usize) -> f64x2 {
     if rung == 0 { f64x2::splat(value.to_array()[0]) } else { value }
+}
+
+/// Sets the levers: each body by its own share of the mass up to its middle, and by all that hangs on its other end with its whole length.
+fn hang_levers(rungs: &mut [Rung]) {
+    let mut outside = f64x2::ZERO;
+    for (k, rung) in rungs.iter_mut().enumerate().rev() {
+        if k == 0 {
+            // On the root's other end hangs the right arm.
+            outside = f64x2::splat(outside.to_array()[1]);
+        }
+        rung.lever = rung.reach * (rung.share * rung.middle + outside);
+        outside += rung.share;
+    }
 }
 
 /// Gravity along x and z (cm/s²) of a floor that rises by `slope` (rad) along +x, in its axes.
@@ -557,13 +547,15 @@ impl Engine for PlanarEngine {
         self.solve_step(share)?;
         let (step, per_weight) = (f64x2::splat(h), f64x2::splat(1.0 / self.weight));
         let (mut momentum, mut changed) = ([f64x2::ZERO; 2], f64x2::ZERO);
-        let mut inner = [f64x2::ZERO; 2];
+        let (mut inner, mut turns) = ([f64x2::ZERO; 2], [f64x2::ZERO; 2]);
         for (k, rung) in self.rungs.iter_mut().enumerate() {
             let mean = rung.mean_of_centre();
             let before = rung.angle;
             rung.angle += step * mean[0];
-            rung.turn = (rung.angle - inner[1]) - (before - inner[0]);
+            // The root has no joint, and no voltage.
+            let turn = if k == 0 { f64x2::ZERO } else { (rung.angle - inner[1]) - (before - inner[0]) };
             inner = [outwards(before, k), outwards(rung.angle, k)];
+            turns = [turns[0] + rung.volts * turn, turns[1] + turn * turn];
             let change: Spatials = std::array::from_fn(|k| (mean[k] - rung.motion[k]) * per_weight);
             for (motion, change) in rung.motion.iter_mut().zip(change) {
                 *motion += change;
@@ -582,7 +574,7 @@ impl Engine for PlanarEngine {
                 self.velocity[k] = after;
             }
         }
-        self.sum_turns();
+        self.turns = turns.map(f64x2::reduce_add);
         self.step += 1;
         Ok(())
     }

@@ -17,8 +17,8 @@ type Spatial = [f64; 3];
 /// The same of two bodies.
 pub(super) type Spatials = [f64x2; 3];
 
-/// The largest turn (rad) for which the series in [`turned`] are exact to the last digit.
-const LARGEST_SERIES: f64 = 0.1;
+/// The largest turn (rad) for which the series in [`turned`] are exact to the last digit: the first term left out is 6·10⁻¹⁷ of the turn.
+const LARGEST_SERIES: f64 = 0.03;
 
 /// Two bodies: what stays, their state, and what the step at hand needs.
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,8 +26,11 @@ pub(super) struct Rung {
     pub(super) mass: f64x2,
     /// Share of the robot's mass.
     pub(super) share: f64x2,
-    /// About the centre of mass (g·cm²).
+    /// How far the centre of mass of the robot, seen from the root, lies along the links (cm): it is the sum of lever · along.
+    pub(super) lever: f64x2,
+    /// About the centre of mass and about the reference point (g·cm²).
     pub(super) inertia: f64x2,
+    pub(super) inertia_at_reference: f64x2,
     /// From the reference point to the other end (cm), negative on the left arm.
     pub(super) reach: f64x2,
     /// Of the joint at the reference point (dyn·cm/rad); none where there is no body.
@@ -40,9 +43,8 @@ pub(super) struct Rung {
     pub(super) angle: f64x2,
     /// Rate (rad/s) and velocity of the centre of mass (cm/s).
     pub(super) motion: Spatials,
-    /// Voltage on the joint, negative on the right arm (V), and how far the joint turned in the last step (rad), both seen from the root.
+    /// Voltage on the joint as seen from the root: negative on the right arm (V).
     pub(super) volts: f64x2,
-    pub(super) turn: f64x2,
     /// Angle at which the joint's spring is at rest, body towards the root to this one (rad).
     pub(super) rest_angle: f64x2,
     /// The angle that `along`, the direction from left end to right one, is of, and the other end less the reference point (cm).
@@ -54,10 +56,9 @@ pub(super) struct Rung {
     /// Momentum about the reference point that the mean motion is to have, and the joint's part of it.
     pub(super) momentum: Spatials,
     pub(super) torque: f64x2,
-    // Of the walk to the root: inertia·S, 1/D, the joint's own part.
-    column: Spatials,
-    inverse: f64x2,
-    rest: f64x2,
+    /// Of the walk to the root: the mean rate is `own` + `carried` · (turn, −x, −z) of the inner body at the reference point.
+    carried: Spatials,
+    own: f64x2,
     /// Mean motion of the reference point over the step.
     pub(super) mean: Spatials,
 }
@@ -93,19 +94,6 @@ impl Rung {
         self.torque = share * self.stiffness * (self.angle - inner - self.rest_angle);
     }
 
-    /// Velocity of the other ends relative to the reference points.
-    #[inline(always)]
-    pub(super) fn velocity_across(&self) -> [f64x2; 2] {
-        [-self.motion[0] * self.across[1], self.motion[0] * self.across[0]]
-    }
-
-    /// Mean motion of the other ends.
-    #[inline(always)]
-    fn mean_of_end(&self) -> Spatials {
-        let [turn, x, z] = self.mean;
-        [turn, x - turn * self.across[1], z + turn * self.across[0]]
-    }
-
     /// Mean motion of the centres of mass.
     #[inline(always)]
     pub(super) fn mean_of_centre(&self) -> Spatials {
@@ -135,17 +123,14 @@ pub(super) fn direction(angle: f64x2) -> [f64x2; 2] {
     [f64x2::new(angle.map(f64::cos)), f64x2::new(angle.map(f64::sin))]
 }
 
-/// Two directions turned by small angles (rad), at unit length.
+/// Two directions turned by small angles (rad): with t the tangent of half an angle, sin = 2 t/(1 + t²) and cos = 1 − t sin.
 #[inline(always)]
 fn turned([x, z]: [f64x2; 2], by: f64x2) -> [f64x2; 2] {
     let c = f64x2::splat;
     let s = by * by;
-    let sin =
-        by * (c(1.0) - s * c(1.0 / 6.0) * (c(1.0) - s * c(0.05) * (c(1.0) - s * c(1.0 / 42.0) * (c(1.0) - s * c(1.0 / 72.0)))));
-    let cos = c(1.0) - s * c(0.5) * (c(1.0) - s * c(1.0 / 12.0) * (c(1.0) - s * c(1.0 / 30.0) * (c(1.0) - s * c(1.0 / 56.0))));
-    let (x, z) = (x * cos - z * sin, x * sin + z * cos);
-    let scale = c(1.5) - c(0.5) * (x * x + z * z);
-    [x * scale, z * scale]
+    let t = by * (c(0.5) + s * (c(1.0 / 24.0) + s * (c(1.0 / 240.0) + s * c(17.0 / 40320.0))));
+    let sin = (t + t) / (c(1.0) + t * t);
+    [x - sin * (z + t * x), z + sin * (x - t * z)]
 }
 
 /// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms.
@@ -164,20 +149,23 @@ struct Articulated {
 
 impl Arms {
     /// Moves from a rung's other ends to its reference points and adds the rung itself.
+    ///
+    /// What comes in is added last: a rung waits for the one before as short as can be.
     #[inline(always)]
     fn take(&mut self, rung: &Rung) {
         let Self { inertia, force } = self;
         let [wx, wz] = [-rung.across[1], rung.across[0]];
-        let [_, i01, i02, i11, i12, i22] = *inertia;
-        let (bx, bz) = (i11 * wx + i12 * wz, i12 * wx + i22 * wz);
-        let [hx, hz] = rung.half;
-        let (mx, mz) = (rung.mass * hx, rung.mass * hz);
-        inertia[0] += (wx * (i01 + i01 + bx) + wz * (i02 + i02 + bz)) + (rung.inertia + mz * hz + mx * hx);
-        inertia[1] += bx - mz;
-        inertia[2] += bz + mx;
+        let [i00, i01, i02, i11, i12, i22] = *inertia;
+        let (two_x, two_z) = (wx + wx, wz + wz);
+        let [mx, mz] = rung.half.map(|half| rung.mass * half);
+        let squares = (wx * wx) * i11 + (wz * wz) * i22;
+        let rest = (i00 + rung.inertia_at_reference) + (two_x * wz) * i12;
+        inertia[0] = (squares + rest) + (two_x * i01 + two_z * i02);
+        inertia[1] = (i01 - mz) + (wx * i11 + wz * i12);
+        inertia[2] = (i02 + mx) + (wx * i12 + wz * i22);
         inertia[3] += rung.mass;
         inertia[5] += rung.mass;
-        force[0] += (wx * force[1] + wz * force[2]) + rung.momentum[0];
+        force[0] = (force[0] + rung.momentum[0]) + (wx * force[1] + wz * force[2]);
         force[1] += rung.momentum[1];
         force[2] += rung.momentum[2];
     }
@@ -190,23 +178,23 @@ impl Arms {
     }
 
     /// What of it is felt through the joints at the rung's reference points.
+    ///
+    /// With D = I₀₀ + implicit, 1 − I₀₀/D is implicit/D: nothing is lost where a joint is soft.
     #[inline(always)]
     fn through_joints(&mut self, rung: &mut Rung) {
         let Self { inertia, force } = self;
         let c = [inertia[0], inertia[1], inertia[2]];
         let inverse = f64x2::ONE / (c[0] + rung.implicit);
-        let rest = rung.torque + force[0];
-        (rung.column, rung.inverse, rung.rest) = (c, inverse, rest);
-        // The products do not wait for the division.
+        rung.carried = [rung.implicit * inverse, c[1] * inverse, c[2] * inverse];
+        rung.own = (rung.torque + force[0]) * inverse;
         for k in 0..3 {
-            force[k] -= c[k] * rest * inverse;
+            force[k] -= c[k] * rung.own;
+            inertia[k] = c[k] * rung.carried[0];
         }
-        inertia[0] -= c[0] * c[0] * inverse;
-        inertia[1] -= c[0] * c[1] * inverse;
-        inertia[2] -= c[0] * c[2] * inverse;
-        inertia[3] -= c[1] * c[1] * inverse;
-        inertia[4] -= c[1] * c[2] * inverse;
-        inertia[5] -= c[2] * c[2] * inverse;
+        // These are waited for most: their products do not wait for the division.
+        inertia[3] -= (c[1] * c[1]) * inverse;
+        inertia[4] -= (c[1] * c[2]) * inverse;
+        inertia[5] -= (c[2] * c[2]) * inverse;
     }
 
     /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
@@ -224,19 +212,17 @@ impl Arms {
 }
 
 impl Articulated {
-    /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned.
+    /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned;
+    /// without fractions, so that no division waits for another.
     fn motion(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
         let [turn, x, z] = self.force;
-        let a = 1.0 / i22;
-        let (b, c) = (i12 * a, i02 * a);
-        let d = 1.0 / (i11 - b * i12);
-        let cross = i01 - b * i02;
-        let e = cross * d;
-        let pull = x - b * z;
-        let spin = (turn - c * z - e * pull) / (i00 - c * i02 - e * cross);
-        let along = d * pull - e * spin;
-        [spin, along, a * z - b * along - c * spin]
+        let (a, b, c) = (i00 * i22 - i02 * i02, i01 * i22 - i12 * i02, i11 * i22 - i12 * i12);
+        let (turn, x) = (turn * i22 - i02 * z, x * i22 - i12 * z);
+        let spin = (turn * c - b * x) / (a * c - b * b);
+        let along = x * (1.0 / c) - spin * (b / c);
+        let fall = 1.0 / i22;
+        [spin, along, z * fall - spin * (i02 * fall) - along * (i12 * fall)]
     }
 }
 
@@ -279,15 +265,17 @@ pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut floor: Inwards, law: &La
         }
         whole.motion()
     };
-    root.mean = motion.map(f64x2::splat);
-    // Lane 0 starts at the root's reference point, lane 1 at its other end.
-    let end = root.mean_of_end();
-    let mut mean: Spatials = std::array::from_fn(|k| f64x2::new([motion[k], end[k].to_array()[0]]));
+    let [mut turn, mut x, mut z] = motion.map(f64x2::splat);
+    root.mean = [turn, x, z];
+    // Lane 0 goes on from the root's reference point, lane 1 from its other end.
+    let mut across = root.across.map(|part| f64x2::new([0.0, part.to_array()[0]]));
     for rung in arms {
-        let [turn, x, z] = mean;
-        let c = rung.column;
-        let rate = rung.inverse * (rung.rest - (c[0] * turn + c[1] * x + c[2] * z));
-        rung.mean = [turn + rate, x, z];
-        mean = rung.mean_of_end();
+        let [a, b, c] = rung.carried;
+        let carried = a + (b * across[1] - c * across[0]);
+        let on = carried * turn + (rung.own - (b * x + c * z));
+        (x, z) = (x - turn * across[1], z + turn * across[0]);
+        turn = on;
+        rung.mean = [turn, x, z];
+        across = rung.across;
     }
 }
