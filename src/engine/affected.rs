@@ -77,6 +77,10 @@ impl Engine for AffectedEngine {
         self.engine.kinetic_energy()
     }
 
+    fn gravitational_energy(&self) -> Option<f64> {
+        self.engine.gravitational_energy()
+    }
+
     fn step(&self) -> u64 {
         self.engine.step()
     }

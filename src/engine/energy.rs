@@ -120,6 +120,10 @@ pub struct Books {
     /// State of the step before, or of the last look if the engine works at the middle of steps.
     before: JointState,
     begun: bool,
+    /// Steps until something is to be taken in, of an engine that works at the middle of steps.
+    pause: u64,
+    /// What such an engine had worked and lost when the books were opened.
+    turns_before: [f64; 2],
     ground_energy: f64,
     numerical_before: f64,
     account: f64,
@@ -149,6 +153,8 @@ impl Books {
             contacts: Vec::new(),
             before: JointState::default(),
             begun: false,
+            pause: 0,
+            turns_before: [0.0; 2],
             ground_energy: 0.0,
             numerical_before: 0.0,
             account: 0.0,
@@ -164,15 +170,21 @@ impl Books {
     /// # Errors
     /// Whatever the engine reports when it is read.
     pub fn take(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
-        let midpoint = engine.midpoint();
-        if self.begun {
-            let [electrical, heat] = self.work(engine);
-            let k = self.joint.stiffness;
-            self.balance.electrical_in_erg += k * electrical;
-            self.balance.damping_out_erg += k * self.joint.damping_time * heat;
+        if self.pause > 0 {
+            self.pause -= 1;
+            return Ok(());
         }
+        let midpoint = engine.midpoint();
+        let [electrical, heat] = self.work(engine, midpoint);
+        let k = self.joint.stiffness;
+        self.balance.electrical_in_erg += k * electrical;
+        self.balance.damping_out_erg += k * self.joint.damping_time * heat;
         let every = if midpoint { LOOK_EVERY_MIDPOINT } else { LOOK_EVERY };
-        let looks = !self.begun || engine.step().is_multiple_of(every);
+        let since = engine.step() % every;
+        if midpoint {
+            self.pause = every - since - 1;
+        }
+        let looks = !self.begun || since == 0;
         if looks || !midpoint {
             self.before.clone_from(engine.joints());
         }
@@ -183,20 +195,27 @@ impl Books {
         Ok(())
     }
 
-    /// Work of the piezo moments in the last step over the stiffness, and heat over stiffness and damping time.
-    fn work(&self, engine: &mut dyn Engine) -> [f64; 2] {
+    /// Work of the piezo moments since the last time over the stiffness, and heat over stiffness and damping time.
+    fn work(&mut self, engine: &mut dyn Engine, midpoint: bool) -> [f64; 2] {
         let per_volt = self.joint.rest_angle_per_volt;
-        if engine.midpoint() {
+        if midpoint {
             // Torques and rates of the middle of the step: the rate is the turn over the step.
-            let [electrical, heat] = engine.turns();
-            return [electrical * per_volt, heat / self.time_step];
+            let turns = engine.turns();
+            let before = std::mem::replace(&mut self.turns_before, turns);
+            return if self.begun {
+                [(turns[0] - before[0]) * per_volt, (turns[1] - before[1]) / self.time_step]
+            } else {
+                [0.0; 2]
+            };
         }
-        let (joints, b) = (engine.joints(), &self.before);
         let (mut electrical, mut heat) = (0.0, 0.0);
-        for i in 0..joints.rates.len() {
-            let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
-            electrical += per_volt * b.motor_voltages[i] * turn;
-            heat += b.rates[i] * turn;
+        if self.begun {
+            let (joints, b) = (engine.joints(), &self.before);
+            for i in 0..joints.rates.len() {
+                let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
+                electrical += per_volt * b.motor_voltages[i] * turn;
+                heat += b.rates[i] * turn;
+            }
         }
         [electrical, heat]
     }
@@ -209,11 +228,14 @@ impl Books {
     }
 
     fn look(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
-        self.move_bodies(&engine.base()?);
-        let sum = |of: &dyn Fn(&Body, &Motion) -> f64| self.bodies.iter().zip(&self.motions).map(|(b, m)| of(b, m)).sum::<f64>();
-        let kinetic = sum(&|b, m| 0.5 * (b.mass * (m.velocity[0].powi(2) + m.velocity[1].powi(2)) + b.inertia * m.rate.powi(2)));
-        let kinetic = engine.kinetic_energy().unwrap_or(kinetic);
-        let height = sum(&|b, m| b.mass * self.gravity * m.centre[1]);
+        let known = (engine.kinetic_energy(), engine.gravitational_energy());
+        let (kinetic, height) = if let (Some(kinetic), Some(height)) = known {
+            (kinetic, height)
+        } else {
+            self.move_bodies(&engine.base()?);
+            let [kinetic, height] = self.energies();
+            (known.0.unwrap_or(kinetic), known.1.unwrap_or(height))
+        };
         let elastic = 0.5 * self.joint.stiffness * self.before.angles.iter().map(|a| a * a).sum::<f64>();
         if !self.begun {
             self.ground_energy = height;
@@ -255,8 +277,18 @@ impl Books {
         Ok(())
     }
 
+    /// Kinetic and gravitational energy of the bodies as they were last moved (erg).
+    fn energies(&self) -> [f64; 2] {
+        let sum = |of: &dyn Fn(&Body, &Motion) -> f64| self.bodies.iter().zip(&self.motions).map(|(b, m)| of(b, m)).sum::<f64>();
+        [
+            sum(&|b, m| 0.5 * (b.mass * (m.velocity[0].powi(2) + m.velocity[1].powi(2)) + b.inertia * m.rate.powi(2))),
+            sum(&|b, m| b.mass * self.gravity * m.centre[1]),
+        ]
+    }
+
     /// Adds what contact did on each link in the last step, as a sample of the interval.
     fn collect(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
+        self.move_bodies(&engine.base()?);
         engine.contacts(&mut self.contacts)?;
         for contact in &self.contacts {
             let m = &self.motions[contact.link];

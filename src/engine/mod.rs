@@ -183,14 +183,19 @@ pub trait Engine {
         false
     }
 
-    /// Sums over the joints, in their order, of voltage times turn (V·rad) and of the turn's square (rad²) in the last step, of an engine that
-    /// works at the middle of steps: what the books of energy read in every step.
+    /// Sums over the joints and all steps so far of voltage times turn (V·rad) and of the turn's square (rad²), of an engine that works at
+    /// the middle of steps: the books of energy read what they grow by.
     fn turns(&self) -> [f64; 2] {
         [0.0; 2]
     }
 
     /// Kinetic energy (erg), where it is more exactly known than from the motion of base and joints.
     fn kinetic_energy(&self) -> Option<f64> {
+        None
+    }
+
+    /// The same of gravitational energy, from any level.
+    fn gravitational_energy(&self) -> Option<f64> {
         None
     }
 

@@ -115,7 +115,7 @@ pub struct PlanarEngine {
     voltages: Vec<f64>,
     /// Whether the state is known to be numbers, because the changes of the last step were.
     finite: bool,
-    /// Of the last step, for the books of energy.
+    /// Of all steps, for the books of energy.
     turns: [f64; 2],
     /// Newton iterations so far, of all steps.
     iterations: u64,
@@ -574,7 +574,7 @@ impl Engine for PlanarEngine {
                 self.velocity[k] = after;
             }
         }
-        self.turns = turns.map(f64x2::reduce_add);
+        self.turns = [0, 1].map(|k| self.turns[k] + turns[k].reduce_add());
         self.step += 1;
         Ok(())
     }
@@ -593,6 +593,10 @@ impl Engine for PlanarEngine {
             rung.mass * (x * x + z * z) + rung.inertia * rate * rate
         };
         Some(0.5 * self.rungs.iter().map(twice).fold(f64x2::ZERO, |a, b| a + b).reduce_add())
+    }
+
+    fn gravitational_energy(&self) -> Option<f64> {
+        (!self.clamped()).then(|| self.mass * self.gravity * self.centre[1])
     }
 
     fn numerical_loss(&self) -> f64 {
