@@ -43,6 +43,7 @@ impl PlanarEngine {
             rung.implicit = rung.stiffness.fast_max(f64x2::ONE);
             rung.mass *= f64x2::splat(HOLD);
             rung.inertia *= f64x2::splat(HOLD);
+            rung.inertia_at_reference *= f64x2::splat(HOLD);
             rung.motion = Default::default();
         }
         self.velocity = [0.0; 2];
@@ -50,6 +51,7 @@ impl PlanarEngine {
         let settled = self.settle_in_steps(&dynamic);
         for (rung, real) in self.rungs.iter_mut().zip(&dynamic) {
             (rung.mass, rung.inertia, rung.implicit) = (real.mass, real.inertia, real.implicit);
+            rung.inertia_at_reference = real.inertia_at_reference;
         }
         if let Some(floor) = &mut self.floor {
             floor.swap_grips(&mut grips);
