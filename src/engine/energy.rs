@@ -122,7 +122,7 @@ pub struct Books {
     begun: bool,
     /// Steps until something is to be taken in, of an engine that works at the middle of steps.
     pause: u64,
-    /// What such an engine had worked and lost when the books were opened.
+    /// [`Engine::turns`] of such an engine when something was last taken in.
     turns_before: [f64; 2],
     ground_energy: f64,
     numerical_before: f64,
@@ -176,9 +176,11 @@ impl Books {
         }
         let midpoint = engine.midpoint();
         let [electrical, heat] = self.work(engine, midpoint);
-        let k = self.joint.stiffness;
-        self.balance.electrical_in_erg += k * electrical;
-        self.balance.damping_out_erg += k * self.joint.damping_time * heat;
+        if self.begun {
+            let k = self.joint.stiffness;
+            self.balance.electrical_in_erg += k * electrical;
+            self.balance.damping_out_erg += k * self.joint.damping_time * heat;
+        }
         let every = if midpoint { LOOK_EVERY_MIDPOINT } else { LOOK_EVERY };
         let since = engine.step() % every;
         if midpoint {
@@ -202,20 +204,14 @@ impl Books {
             // Torques and rates of the middle of the step: the rate is the turn over the step.
             let turns = engine.turns();
             let before = std::mem::replace(&mut self.turns_before, turns);
-            return if self.begun {
-                [(turns[0] - before[0]) * per_volt, (turns[1] - before[1]) / self.time_step]
-            } else {
-                [0.0; 2]
-            };
+            return [(turns[0] - before[0]) * per_volt, (turns[1] - before[1]) / self.time_step];
         }
+        let (joints, b) = (engine.joints(), &self.before);
         let (mut electrical, mut heat) = (0.0, 0.0);
-        if self.begun {
-            let (joints, b) = (engine.joints(), &self.before);
-            for i in 0..joints.rates.len() {
-                let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
-                electrical += per_volt * b.motor_voltages[i] * turn;
-                heat += b.rates[i] * turn;
-            }
+        for i in 0..b.rates.len() {
+            let turn = 0.5 * (b.rates[i] + joints.rates[i]) * self.time_step;
+            electrical += per_volt * b.motor_voltages[i] * turn;
+            heat += b.rates[i] * turn;
         }
         [electrical, heat]
     }
