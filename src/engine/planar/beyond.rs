@@ -8,7 +8,8 @@
 
 use wide::f64x2;
 
-use super::Rung;
+use super::lanes::Lanes;
+use super::recursion::Quad;
 use crate::model::{AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
 
 /// Repetitions end when no torque of friction changes by more than this share of its moment, or fail after so many.
@@ -33,22 +34,22 @@ pub(super) struct Beyond {
     /// ½ ρ C_d w (g/cm²).
     drag: f64,
     /// Implicit terms of the plain joints.
-    implicit: Vec<f64x2>,
+    implicit: Vec<Lanes>,
     /// Torque terms of the plain joints in this step.
-    torque: Vec<f64x2>,
+    torque: Vec<Lanes>,
     /// 1 where there is a joint.
-    joint: Vec<f64x2>,
+    joint: Vec<Lanes>,
     /// Mean rates of the joints in the last step (rad/s).
-    rates: Vec<f64x2>,
+    rates: Vec<Lanes>,
     /// Whether a joint has turned back in this step's repetitions.
-    turned_back: Vec<[bool; 2]>,
+    turned_back: Vec<[bool; 4]>,
     /// q_j of the loss ladder (rad).
-    memory: Vec<[f64x2; LOSS_TIMES.len()]>,
+    memory: Vec<[Lanes; LOSS_TIMES.len()]>,
 }
 
 impl Beyond {
     /// None if the robot has nothing of it.
-    pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, rungs: &[Rung]) -> Option<Self> {
+    pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Self> {
         if !extensions.bends_torque_law() && extensions.drag == 0.0 {
             return None;
         }
@@ -57,10 +58,11 @@ impl Beyond {
             let mean = gone * time / step;
             [1.0 - gone, time * gone, mean, time * (1.0 - mean)]
         });
-        let count = rungs.len();
-        let joint = rungs.iter().enumerate().map(|(k, rung)| {
-            let there = |lane: usize| if k > 0 && rung.mass.to_array()[lane] > 0.0 { 1.0 } else { 0.0 };
-            f64x2::new([there(0), there(1)])
+        let count = quads.len();
+        let joint = quads.iter().enumerate().map(|(k, quad)| {
+            // The root, in the first lane, has none.
+            let there = |lane: usize| if k + lane > 0 && quad.mass.lane(lane) > 0.0 { 1.0 } else { 0.0 };
+            Lanes::new(std::array::from_fn(there))
         });
         Some(Self {
             softening: extensions.softening / (link * link),
@@ -69,11 +71,11 @@ impl Beyond {
             ladder,
             half_step: 0.5 * step,
             drag: 0.5 * AIR_DENSITY * extensions.drag * width,
-            implicit: rungs.iter().map(|rung| rung.implicit).collect(),
-            torque: vec![f64x2::ZERO; count],
+            implicit: quads.iter().map(|quad| quad.implicit).collect(),
+            torque: vec![Lanes::ZERO; count],
             joint: joint.collect(),
-            rates: vec![f64x2::ZERO; count],
-            turned_back: vec![[false; 2]; count],
+            rates: vec![Lanes::ZERO; count],
+            turned_back: vec![[false; 4]; count],
             memory: vec![Default::default(); count],
         })
     }
@@ -83,36 +85,32 @@ impl Beyond {
     }
 
     /// Elastic torque of softening and its slope, at the elastic angle δ.
-    fn softened(&self, stiffness: f64x2, delta: f64x2) -> (f64x2, f64x2) {
+    fn softened(&self, stiffness: Lanes, delta: Lanes) -> (Lanes, Lanes) {
         let most = 1.0 - LEAST_STIFFNESS;
-        let [torque, slope]: [[f64; 2]; 2] = {
-            let pairs = delta.to_array().map(|delta| {
-                let share = self.softening * delta * delta;
-                if share < most { [share * delta, 3.0 * share] } else { [most * delta, most] }
-            });
-            [pairs.map(|pair| pair[0]), pairs.map(|pair| pair[1])]
-        };
-        (stiffness * f64x2::new(torque), stiffness * f64x2::new(slope))
+        let share = |delta: f64| self.softening * delta * delta;
+        let torque = delta.map(|delta| share(delta).min(most) * delta);
+        let slope = delta.map(|delta| if share(delta) < most { 3.0 * share(delta) } else { most });
+        (stiffness * torque, stiffness * slope)
     }
 
     /// Extra torques of a joint at rest, for statics, seen from the root.
-    pub(super) fn at_rest(&self, rung: &Rung, delta: f64x2) -> f64x2 {
-        if self.softening == 0.0 { f64x2::ZERO } else { self.softened(rung.stiffness, delta).0 }
+    pub(super) fn at_rest(&self, k: usize, quad: &Quad, delta: Lanes) -> Lanes {
+        if self.softening == 0.0 { Lanes::ZERO } else { self.softened(self.joint[k] * quad.stiffness, delta).0 }
     }
 
     /// Extra torques at elastic angle and rate, seen from the root: what is recorded.
-    pub(super) fn now(&self, k: usize, rung: &Rung, delta: f64x2, rate: f64x2) -> f64x2 {
-        let friction = f64x2::new(rate.to_array().map(|rate| self.friction * (rate / DRY_FRICTION_RATE).tanh()));
-        let stored = self.memory[k].iter().fold(f64x2::ZERO, |sum, q| sum + *q);
-        self.joint[k] * (self.at_rest(rung, delta) - friction) - rung.stiffness * f64x2::splat(self.loss) * stored
+    pub(super) fn now(&self, k: usize, quad: &Quad, delta: Lanes, rate: Lanes) -> Lanes {
+        let friction = rate.map(|rate| self.friction * (rate / DRY_FRICTION_RATE).tanh());
+        let stored = self.memory[k].iter().fold(Lanes::ZERO, |sum, q| sum + *q);
+        self.at_rest(k, quad, delta) - self.joint[k] * friction - quad.stiffness * Lanes::splat(self.loss) * stored
     }
 
-    /// Begins a step: keeps the plain torques that `rungs` carry.
-    pub(super) fn begin(&mut self, rungs: &[Rung]) {
-        for (torque, rung) in self.torque.iter_mut().zip(rungs) {
-            *torque = rung.torque;
+    /// Begins a step: keeps the plain torques that the bodies carry.
+    pub(super) fn begin(&mut self, quads: &[Quad]) {
+        for (torque, quad) in self.torque.iter_mut().zip(quads) {
+            *torque = quad.torque;
         }
-        self.turned_back.fill([false; 2]);
+        self.turned_back.fill([false; 4]);
     }
 
     /// Slope s and constant part e* + s u* of friction about the rate `u` of a joint.
@@ -129,47 +127,48 @@ impl Beyond {
     }
 
     /// Puts the extra torques, linear about the last rates, into the joints: `share` (s) of them.
-    pub(super) fn load(&self, rungs: &mut [Rung], share: f64) {
-        let share = f64x2::splat(share);
-        let half = f64x2::splat(self.half_step);
-        let mut inner = f64x2::splat(rungs[0].angle.to_array()[0]);
-        for (k, rung) in rungs.iter_mut().enumerate().skip(1) {
-            let rate = self.rates[k];
-            let (mut torque, mut slope) = (f64x2::ZERO, f64x2::ZERO);
+    pub(super) fn load(&self, quads: &mut [Quad], share: f64) {
+        let share = Lanes::splat(share);
+        let half = Lanes::splat(self.half_step);
+        let mut before = f64x2::ZERO;
+        for (k, quad) in quads.iter_mut().enumerate() {
+            let (rate, joint) = (self.rates[k], self.joint[k]);
+            let stiffness = joint * quad.stiffness;
+            let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
             if self.softening != 0.0 {
-                let (soft, tangent) = self.softened(rung.stiffness, rung.angle - inner - rung.rest_angle + half * rate);
+                let delta = quad.angle - quad.angle.inner(before) - quad.rest_angle;
+                let (soft, tangent) = self.softened(stiffness, delta + half * rate);
                 torque += soft - half * tangent * rate;
-                slope -= half * tangent;
+                slope += -(half * tangent);
             }
             if self.friction != 0.0 {
-                let [a, b] = rate.to_array();
-                let [left, right] = [self.friction(a, self.turned_back[k][0]), self.friction(b, self.turned_back[k][1])];
-                slope += self.joint[k] * f64x2::new([left.0, right.0]);
-                torque += self.joint[k] * f64x2::new([left.1, right.1]);
+                let of: [_; 4] = std::array::from_fn(|lane| self.friction(rate.lane(lane), self.turned_back[k][lane]));
+                slope += joint * Lanes::new(of.map(|(slope, _)| slope));
+                torque += joint * Lanes::new(of.map(|(_, rest)| rest));
             }
             if self.loss != 0.0 {
-                let stiffness = rung.stiffness * f64x2::splat(self.loss);
+                let stiffness = stiffness * Lanes::splat(self.loss);
                 for ([_, _, kept, added], q) in self.ladder.iter().zip(&self.memory[k]) {
-                    torque -= stiffness * f64x2::splat(*kept) * *q;
-                    slope += stiffness * f64x2::splat(*added);
+                    torque += -(stiffness * Lanes::splat(*kept) * *q);
+                    slope += stiffness * Lanes::splat(*added);
                 }
             }
-            rung.torque = self.torque[k] + share * torque;
-            rung.implicit = self.implicit[k] + share * slope;
-            inner = rung.angle;
+            quad.torque = self.torque[k] + share * torque;
+            quad.implicit = self.implicit[k] + share * slope;
+            before = quad.angle.rung(1);
         }
     }
 
     /// Takes the joints' mean rates of a solution; whether friction is as it was put.
-    pub(super) fn accept(&mut self, rungs: &[Rung]) -> bool {
-        let mut inner = f64x2::splat(rungs[0].mean[0].to_array()[0]);
+    pub(super) fn accept(&mut self, quads: &[Quad]) -> bool {
+        let mut before = f64x2::ZERO;
         let mut changed = 0.0_f64;
-        for (k, rung) in rungs.iter().enumerate().skip(1) {
-            let rate = self.joint[k] * (rung.mean[0] - inner);
-            inner = rung.mean[0];
+        for (k, quad) in quads.iter().enumerate() {
+            let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
+            before = quad.mean[0].rung(1);
             if self.friction != 0.0 {
-                let pairs = rate.to_array().into_iter().zip(self.rates[k].to_array());
-                for (lane, (now, before)) in pairs.enumerate() {
+                for lane in 0..4 {
+                    let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
                     // What was put, against what it should have been.
                     let (slope, rest) = self.friction(before, self.turned_back[k][lane]);
                     let put = slope * now - rest;
@@ -189,21 +188,21 @@ impl Beyond {
         }
         for (memory, rate) in self.memory.iter_mut().zip(&self.rates) {
             for (q, [left, added, ..]) in memory.iter_mut().zip(&self.ladder) {
-                *q = f64x2::splat(*left) * *q + f64x2::splat(*added) * *rate;
+                *q = Lanes::splat(*left) * *q + Lanes::splat(*added) * *rate;
             }
         }
     }
 
-    /// Drag on the bodies of a rung: moment about the centre of mass (dyn·cm) and force (dyn).
-    pub(super) fn drag(&self, rung: &Rung) -> [f64x2; 3] {
-        let [rate, x, z] = rung.motion;
-        let normal = [-rung.along[1], rung.along[0]];
+    /// Drag on the bodies: moment about the centre of mass (dyn·cm) and force (dyn).
+    pub(super) fn drag(&self, quad: &Quad) -> [Lanes; 3] {
+        let [rate, x, z] = quad.motion;
+        let normal = [-quad.along[1], quad.along[0]];
         let speed = x * normal[0] + z * normal[1];
-        let (mut force, mut moment) = (f64x2::ZERO, f64x2::ZERO);
+        let (mut force, mut moment) = (Lanes::ZERO, Lanes::ZERO);
         for (at, weight) in GAUSS {
-            let arm = (f64x2::splat(0.5 + 0.5 * at) - rung.middle) * rung.reach;
+            let arm = (Lanes::splat(0.5 + 0.5 * at) - quad.middle) * quad.reach;
             let speed = speed + rate * arm;
-            let part = f64x2::splat(-0.5 * weight * self.drag) * rung.reach.abs() * speed * speed.abs();
+            let part = Lanes::splat(-0.5 * weight * self.drag) * quad.reach.abs() * speed * speed.abs();
             force += part;
             moment += part * arm;
         }
@@ -222,8 +221,8 @@ impl Beyond {
 
     pub(super) fn restore(&mut self, saved: &[f64]) {
         let slots = self.rates.iter_mut().chain(self.memory.iter_mut().flatten());
-        for (slot, pair) in slots.zip(saved.chunks_exact(2)) {
-            *slot = f64x2::new([pair[0], pair[1]]);
+        for (slot, values) in slots.zip(saved.as_chunks().0) {
+            *slot = Lanes::new(*values);
         }
     }
 }

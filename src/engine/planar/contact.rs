@@ -8,6 +8,7 @@
 
 use wide::f64x2;
 
+use super::lanes::fma;
 use super::recursion::{Arms, Spatials};
 
 /// Softness of contact as a share of a body's inverse mass: under half its weight a corner gives way by 3·10⁻⁸ cm/s at steps of 10⁻⁴ s.
@@ -57,23 +58,28 @@ impl Law {
 pub(super) struct Touch(f64x2);
 
 impl Touch {
+    #[inline(always)]
     fn new(sticks: f64x2, slides: f64x2, direction: f64x2) -> Self {
         Self((sticks & f64x2::ONE) | (slides & f64x2::splat(2.0).copysign(direction)))
     }
 
     /// The corners of the lanes of the mask `these`; the others are open.
+    #[inline(always)]
     fn of(self, these: f64x2) -> Self {
         Self(self.0 & these)
     }
 
+    #[inline(always)]
     fn sticks(self) -> f64x2 {
         self.0.simd_eq(f64x2::ONE)
     }
 
+    #[inline(always)]
     fn slides(self) -> f64x2 {
         self.0.abs().simd_eq(f64x2::splat(2.0))
     }
 
+    #[inline(always)]
     fn is_open(self) -> bool {
         !self.0.simd_ne(f64x2::ZERO).any()
     }
@@ -138,8 +144,9 @@ pub(super) struct Corners {
     impulse: [f64x2; 2],
 }
 
+#[inline(always)]
 fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
-    a[0] * b[0] + a[1] * b[1]
+    fma(a[0], b[0], a[1] * b[1])
 }
 
 impl Corners {
@@ -170,7 +177,7 @@ impl Corners {
         self.near = near;
         self.arm = arm;
         self.lift = f64x2::ZERO;
-        self.target = [before[0] * (f64x2::ONE - weight), before[1] + weight * (end - before[1])];
+        self.target = [before[0] * (f64x2::ONE - weight), fma(weight, end - before[1], before[1])];
     }
 
     /// Takes stored states up again.
@@ -180,6 +187,7 @@ impl Corners {
     }
 
     /// Lets corners that reach the floor in this step leave it with the share `restitution` of the speed they come with (cm/s).
+    #[inline(always)]
     pub(super) fn bounce(&mut self, gap: f64x2, speed: f64x2, restitution: f64, law: &Law) {
         if restitution <= 0.0 {
             return;
@@ -192,6 +200,7 @@ impl Corners {
 
     /// Takes off the lift that the convex model gives corners which slide with their bodies' motion `mean` (De Saxcé's correction), by a step
     /// of the fixed-point iteration that is damped by 1/(1 + μ); returns how far the lifts changed at most (cm/s).
+    #[inline(always)]
     pub(super) fn take_off_lift(&mut self, mean: &Spatials, law: &Law) -> f64 {
         let weight = f64x2::splat(law.weight);
         let mu = self.grip.friction;
@@ -205,6 +214,7 @@ impl Corners {
     }
 
     /// Whether neither touches, of corners near the floor.
+    #[inline(always)]
     pub(super) fn is_open(&self) -> bool {
         self.touch.is_open()
     }
@@ -228,7 +238,7 @@ impl Corners {
         let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
         let mu = self.grip.friction;
         let sideways = pull[0].abs();
-        let pressed = pull[1] + mu * sideways;
+        let pressed = fma(mu, sideways, pull[1]);
         let touches = pressed.simd_gt(f64x2::ZERO) & self.near;
         if !touches.any() {
             // So most corners near the floor.
@@ -266,38 +276,35 @@ impl Corners {
         let sticks = self.touch.sticks();
         if sticks.any() {
             let k = sticks & stiffness;
-            inertia[0] += k * (ax * ax + az * az);
-            inertia[1] -= k * az;
-            inertia[2] += k * ax;
+            inertia[0] = fma(k, dot([ax, az], [ax, az]), inertia[0]);
+            inertia[1] = fma(-k, az, inertia[1]);
+            inertia[2] = fma(k, ax, inertia[2]);
             inertia[3] += k;
             inertia[5] += k;
-            force[0] += k * (ax * tz - az * tx);
-            force[1] += k * tx;
-            force[2] += k * tz;
+            force[0] = fma(k, fma(ax, tz, -(az * tx)), force[0]);
+            force[1] = fma(k, tx, force[1]);
+            force[2] = fma(k, tz, force[2]);
         }
         let slides = self.touch.slides();
         if slides.any() {
             let k = slides & stiffness;
             let [dx, dz] = self.slide(self.touch);
             // Velocity of the corner along d is row · (ω, v).
-            let row = [dz * ax - dx * az, dx, dz];
+            let row = [fma(dz, ax, -(dx * az)), dx, dz];
             let stiff = row.map(|part| k * part);
-            let wanted = dx * tx + dz * tz;
-            inertia[0] += stiff[0] * row[0];
-            inertia[1] += stiff[0] * row[1];
-            inertia[2] += stiff[0] * row[2];
-            inertia[3] += stiff[1] * row[1];
-            inertia[4] += stiff[1] * row[2];
-            inertia[5] += stiff[2] * row[2];
+            let wanted = dot([dx, dz], [tx, tz]);
+            for (k, [i, j]) in [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]].into_iter().enumerate() {
+                inertia[k] = fma(stiff[i], row[j], inertia[k]);
+            }
             for i in 0..3 {
-                force[i] += stiff[i] * wanted;
+                force[i] = fma(stiff[i], wanted, force[i]);
             }
         }
     }
 
     #[inline(always)]
     fn velocity_in(&self, mean: &Spatials) -> [f64x2; 2] {
-        [mean[1] - mean[0] * self.arm[1], mean[2] + mean[0] * self.arm[0]]
+        [fma(-mean[0], self.arm[1], mean[1]), fma(mean[0], self.arm[0], mean[2])]
     }
 
     /// Whether the bodies' motion `mean` asks for the states that it was solved with; the impulses belong to it then.
@@ -315,6 +322,7 @@ impl Corners {
     }
 
     /// Prepares a search from the iterate to `mean`; returns impulse·step at the iterate as the piece extends it to the end.
+    #[inline(always)]
     pub(super) fn aim(&mut self, mean: &Spatials, law: &Law) -> f64x2 {
         let to = self.velocity_in(mean);
         self.step = [to[0] - self.velocity[0], to[1] - self.velocity[1]];
@@ -325,16 +333,18 @@ impl Corners {
     #[inline(always)]
     fn velocity_at(&self, t: f64) -> [f64x2; 2] {
         let t = f64x2::splat(t);
-        [self.velocity[0] + t * self.step[0], self.velocity[1] + t * self.step[1]]
+        [fma(t, self.step[0], self.velocity[0]), fma(t, self.step[1], self.velocity[1])]
     }
 
     /// impulse·step and its slope at the share `t` of the search.
+    #[inline(always)]
     pub(super) fn search(&self, t: f64, law: &Law) -> [f64x2; 2] {
         let (touch, impulse) = self.law(self.velocity_at(t), law);
         [dot(impulse, self.step), -self.product(touch, self.step, self.step, law)]
     }
 
     /// Goes the share `t` of the search.
+    #[inline(always)]
     pub(super) fn go(&mut self, t: f64, law: &Law) {
         self.velocity = self.velocity_at(t);
         (self.touch, self.impulse) = self.law(self.velocity, law);

@@ -4,7 +4,8 @@ use wide::f64x2;
 
 use super::LARGEST_FRICTION;
 use super::contact::{Corners, Grip, Law, Touch};
-use super::recursion::{Arms, Rung, Spatials};
+use super::lanes::{fma, pair};
+use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
 /// The corners of all bodies. Those that may touch in the step at hand are listed.
@@ -22,10 +23,13 @@ pub(super) struct Floor {
     looks: u64,
 }
 
-/// Height of both reference points of a rung above the floor, with half a thickness (cm), and their velocity (cm/s).
+/// Height of both reference points of a rung above the floor, with half a thickness (cm), their velocity (cm/s), the bodies' rates (rad/s), and
+/// the mask of the bodies that there are.
 struct Reference {
     gap: f64x2,
     velocity: [f64x2; 2],
+    rate: f64x2,
+    there: f64x2,
 }
 
 /// A floor that returns some of an impact, or whose friction depends on speed.
@@ -61,7 +65,8 @@ impl Floor {
 
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
     /// moving with `velocity` (cm/s); whether any does. Lanes without mass have no corners.
-    pub(super) fn find(&mut self, rungs: &[Rung], height: f64, velocity: [f64; 2], law: &Law) -> bool {
+    #[inline(always)]
+    pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, velocity: [f64; 2], law: &Law) -> bool {
         self.near.clear();
         self.looks += 1;
         let (step, reach) = law.reach();
@@ -69,19 +74,21 @@ impl Floor {
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
         let mut moving = velocity.map(f64x2::splat);
-        for (k, rung) in rungs.iter().enumerate() {
-            let (rate, across) = (rung.motion[0], rung.across);
+        for k in 0..rungs {
+            let quad = &quads[k / 2];
+            let (along, across) = (pair(&quad.along, k % 2), pair(&quad.across, k % 2));
+            let rate = quad.motion[0].rung(k % 2);
             // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
-            let down = half.copysign(rung.along[0]);
-            let (x, z) = (down * rung.along[1], -down * rung.along[0]);
+            let down = half.copysign(along[0]);
+            let (x, z) = (down * along[1], -down * along[0]);
             let (outer_x, outer_z) = (across[0] + x, across[1] + z);
-            let near = |x: f64x2, z: f64x2| (at + z).simd_lt(reach - step * (moving[1] + rate * x));
+            let near = |x: f64x2, z: f64x2| (at + z).simd_lt(fma(-step, fma(rate, x, moving[1]), reach));
             let (inner, outer) = (near(x, z), near(outer_x, outer_z));
             if (inner | outer).any() {
                 // Most rungs are not: what only these need is made here.
-                let from = Reference { gap: at, velocity: moving };
-                self.place(2 * k, inner, [x, z], rung, &from, law);
-                self.place(2 * k + 1, outer, [outer_x, outer_z], rung, &from, law);
+                let from = Reference { gap: at, velocity: moving, rate, there: quad.mass.rung(k % 2).simd_gt(f64x2::ZERO) };
+                self.place(2 * k, inner, [x, z], &from, law);
+                self.place(2 * k + 1, outer, [outer_x, outer_z], &from, law);
             }
             at = next(at, across[1], k);
             moving = [next(moving[0], -rate * across[1], k), next(moving[1], rate * across[0], k)];
@@ -91,14 +98,14 @@ impl Floor {
 
     /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.
     #[inline(always)]
-    fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], rung: &Rung, from: &Reference, law: &Law) {
-        let near = near & rung.mass.simd_gt(f64x2::ZERO);
+    fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], from: &Reference, law: &Law) {
+        let near = near & from.there;
         if !near.any() {
             return;
         }
-        let rate = rung.motion[0];
+        let rate = from.rate;
         let gap = from.gap + arm[1];
-        let velocity = [from.velocity[0] - rate * arm[1], from.velocity[1] + rate * arm[0]];
+        let velocity = [fma(-rate, arm[1], from.velocity[0]), fma(rate, arm[0], from.velocity[1])];
         self.corners[place].place(self.looks, near, arm, gap, velocity, law);
         if self.surface.is_some() {
             self.feel_surface(place, gap, velocity, law);
@@ -127,33 +134,37 @@ impl Floor {
     /// Adds viscous friction over the time `share` (s) to the momentum of the bodies on the floor, with the root's reference point as in
     /// [`find`](Self::find). A force of its own and not a part of the coefficient: which corner bears the weight of a flat robot changes
     /// from step to step, and with it what a coefficient would have to be.
-    pub(super) fn push_viscous(&self, rungs: &mut [Rung], height: f64, share: f64) {
+    pub(super) fn push_viscous(&self, quads: &mut [Quad], height: f64, share: f64) {
         let push = f64x2::splat(-share * self.viscous());
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
-        for (k, rung) in rungs.iter_mut().enumerate() {
-            let across = rung.across[1];
+        for k in 0..2 * quads.len() {
+            let (quad, rung) = (&mut quads[k / 2], k % 2);
+            let across = quad.across[1].rung(rung);
             // The lowest edge, from the reference point.
-            let edge = across.fast_min(f64x2::ZERO) - half * rung.along[0].abs();
-            let speed = rung.motion[1] - rung.motion[0] * (edge - rung.middle * across);
-            let near = (at + edge).simd_lt(f64x2::splat(VISCOUS_REACH)) & rung.mass.simd_gt(f64x2::ZERO);
+            let edge = across.fast_min(f64x2::ZERO) - half * quad.along[0].rung(rung).abs();
+            let speed = quad.motion[1].rung(rung) - quad.motion[0].rung(rung) * (edge - quad.middle.rung(rung) * across);
+            let near = (at + edge).simd_lt(f64x2::splat(VISCOUS_REACH)) & quad.mass.rung(rung).simd_gt(f64x2::ZERO);
             let impulse = near.select(push * speed, f64x2::ZERO);
-            rung.momentum[0] -= edge * impulse;
-            rung.momentum[1] += impulse;
+            let [turn, x] = [0, 1].map(|part| quad.momentum[part].rung(rung));
+            quad.momentum[0].set_rung(rung, turn - edge * impulse);
+            quad.momentum[1].set_rung(rung, x + impulse);
             at = next(at, across, k);
         }
     }
 
     /// The corners that may touch, for the walk to the root.
+    #[inline(always)]
     pub(super) fn inwards(&self) -> Inwards<'_> {
         Inwards { corners: &self.corners, near: &self.near }
     }
 
     /// Calls `each` with all near corners and the mean motions of their bodies.
     #[inline(always)]
-    pub(super) fn near(&mut self, rungs: &[Rung], mut each: impl FnMut(&mut Corners, &Spatials)) {
+    pub(super) fn near(&mut self, quads: &[Quad], mut each: impl FnMut(&mut Corners, &Spatials)) {
         for &place in &self.near {
-            each(&mut self.corners[place], &rungs[place / 2].mean);
+            let mean = pair(&quads[place / 4].mean, place / 2 % 2);
+            each(&mut self.corners[place], &mean);
         }
     }
 
@@ -228,6 +239,7 @@ impl Inwards<'_> {
 }
 
 /// From a rung's reference points to the next one's: along each arm; from the root, lane 0 stays and lane 1 goes to the root's other end.
+#[inline(always)]
 pub(super) fn next(at: f64x2, across: f64x2, rung: usize) -> f64x2 {
     if rung > 0 {
         return at + across;

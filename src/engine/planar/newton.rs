@@ -1,11 +1,12 @@
 //! Newton's method over the states of the corners.
 
-use wide::f64x2;
+use fearless_simd::{Simd, prelude::*};
 
 use super::contact::Law;
-use super::floor::Floor;
-use super::recursion::{Hold, Spatials, solve};
+use super::lanes::{Four, Lanes, fma, inner};
+use super::recursion::{Motions, solve};
 use super::{EngineError, FrictionModel, PlanarEngine};
+use crate::model::Mount;
 
 /// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured with one [`WHOLE`] step: 41 in the paper's robots; when a
 /// whole chain of 961 bodies is set in motion at once, 799.
@@ -39,55 +40,53 @@ enum Search {
 }
 
 impl PlanarEngine {
-    /// Solves the step's mean motion with the floor; false, and nothing done, if no corner is near it.
-    pub(super) fn solve_on_floor(&mut self, law: &Law) -> Result<bool, EngineError> {
-        let Some(mut floor) = self.floor.take() else { return Ok(false) };
-        let solved = self.solve_with(&mut floor, law);
-        self.floor = Some(floor);
-        solved
-    }
-
-    fn solve_with(&mut self, floor: &mut Floor, law: &Law) -> Result<bool, EngineError> {
-        let (height, velocity) = self.root_over_floor();
-        if !floor.find(&self.rungs, height, velocity, law) {
-            return Ok(false);
-        }
-        self.newton(floor, law)?;
-        if self.friction == FrictionModel::Coulomb {
-            for _ in 0..LARGEST_LIFTS {
-                let mut changed = 0.0_f64;
-                floor.near(&self.rungs, |corners, mean| changed = changed.max(corners.take_off_lift(mean, law)));
-                if changed < LIFT_ENOUGH {
-                    break;
-                }
-                self.newton(floor, law)?;
+    /// Solves the step's mean motion, with the floor.
+    #[inline(always)]
+    pub(super) fn solve_on_floor<S: Simd>(&mut self, simd: S, law: &Law) -> Result<(), EngineError> {
+        let near = self.mount == Mount::Ground && {
+            let (height, velocity) = self.root_over_floor(simd);
+            self.floor.find(&self.quads, self.rungs, height, velocity, law)
+        };
+        for lifts in 0..=LARGEST_LIFTS {
+            let iterations = self.newton(simd, law)?;
+            if !near {
+                break;
+            }
+            self.iterations += iterations;
+            if self.friction == FrictionModel::Convex || lifts == LARGEST_LIFTS {
+                break;
+            }
+            let mut changed = 0.0_f64;
+            self.floor.near(&self.quads, |corners, mean| changed = changed.max(corners.take_off_lift(mean, law)));
+            if changed < LIFT_ENOUGH {
+                break;
             }
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Newton's method for the corners as they are placed.
     ///
     /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
     /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is lowered along the way there.
-    fn newton(&mut self, floor: &mut Floor, law: &Law) -> Result<(), EngineError> {
+    #[inline(always)]
+    fn newton<S: Simd>(&mut self, simd: S, law: &Law) -> Result<u64, EngineError> {
         let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
         for iteration in 1..=largest {
-            self.iterations += 1;
-            solve(&mut self.rungs, Hold::Free, floor.inwards(), law);
+            solve(&mut self.quads, self.rungs, self.hold, self.floor.inwards(), law);
             let mut agrees = true;
-            floor.near(&self.rungs, |corners, mean| agrees &= corners.agrees(mean, law));
+            self.floor.near(&self.quads, |corners, mean| agrees &= corners.agrees(mean, law));
             if agrees {
-                return Ok(());
+                return Ok(iteration.into());
             }
-            match if iteration <= WHOLE { Search::Whole } else { self.search(floor, law) } {
-                Search::Done => return Ok(()),
+            match if iteration <= WHOLE { Search::Whole } else { self.search(simd, law) } {
+                Search::Done => return Ok(iteration.into()),
                 Search::Part => {}
                 Search::Whole => {
                     // The first states were a guess: any motion will do for an iterate.
-                    floor.near(&self.rungs, |corners, mean| corners.accept(mean));
-                    for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
-                        *iterate = rung.mean;
+                    self.floor.near(&self.quads, |corners, mean| corners.accept(mean));
+                    for (iterate, quad) in self.iterate.iter_mut().zip(&self.quads) {
+                        *iterate = quad.mean;
                     }
                 }
             }
@@ -99,30 +98,32 @@ impl PlanarEngine {
     /// Lowers the cost between the iterate and the rungs' mean motion, and moves the iterate there.
     ///
     /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
-    fn search(&mut self, floor: &mut Floor, law: &Law) -> Search {
-        let (mut metric, mut kinetic) = (f64x2::ZERO, f64x2::ZERO);
-        let mut inner = f64x2::ZERO;
-        for (k, (rung, iterate)) in self.rungs.iter().zip(&self.iterate).enumerate() {
-            let way: Spatials = std::array::from_fn(|i| rung.mean[i] - iterate[i]);
-            let [turn, x, z] = rung.of_centre(way);
-            metric += rung.mass * (x * x + z * z) + rung.inertia * turn * turn;
-            if k > 0 {
-                let rate = turn - inner;
-                // Lanes without mass follow their inner neighbours: their joints do not turn.
-                metric += rung.implicit * rate * rate;
-            }
-            inner = if k > 0 { turn } else { f64x2::splat(turn.to_array()[0]) };
-            let [turn, x, z] = rung.mean_of_centre();
-            kinetic += rung.mass * (x * x + z * z) + rung.inertia * turn * turn;
+    #[inline(always)]
+    fn search<S: Simd>(&mut self, simd: S, law: &Law) -> Search {
+        let zero = Four::splat(simd, 0.0);
+        let (mut metric, mut kinetic) = (zero, zero);
+        let mut before = None;
+        for (quad, iterate) in self.quads.iter().zip(&self.iterate) {
+            let (mass, inertia) = (quad.mass.on(simd), quad.inertia.on(simd));
+            let way: Motions<S> = std::array::from_fn(|i| quad.mean[i].on(simd) - iterate[i].on(simd));
+            let [turn, x, z] = quad.of_centre(way);
+            metric += mass * fma(x, x, z * z) + inertia * turn * turn;
+            // The root has no joint. Lanes without mass follow their inner neighbours: their joints do not turn.
+            let (inner, last) = inner(turn, before.unwrap_or(turn.split().0));
+            let rate = turn - inner;
+            metric += quad.implicit.on(simd) * rate * rate;
+            before = Some(last);
+            let [turn, x, z] = quad.mean_of_centre(simd);
+            kinetic += mass * fma(x, x, z * z) + inertia * turn * turn;
         }
-        let (metric, kinetic) = (metric.reduce_add(), kinetic.reduce_add());
+        let (metric, kinetic) = (Lanes::from(metric).sum(), Lanes::from(kinetic).sum());
         let mut end = 0.0;
-        floor.near(&self.rungs, |corners, mean| {
+        self.floor.near(&self.quads, |corners, mean| {
             let [a, b] = corners.aim(mean, law).to_array();
             end = end + a + b;
         });
         let slope_at = |t: f64| {
-            let [along, slope] = floor.sum(|corners| corners.search(t, law));
+            let [along, slope] = self.floor.sum(|corners| corners.search(t, law));
             (end - (1.0 - t) * metric - along, metric - slope)
         };
         let start = -slope_at(0.0).0;
@@ -152,13 +153,13 @@ impl PlanarEngine {
         if found == 1.0 {
             return Search::Whole;
         }
-        let share = f64x2::splat(found);
-        for (iterate, rung) in self.iterate.iter_mut().zip(&self.rungs) {
-            for (from, to) in iterate.iter_mut().zip(&rung.mean) {
-                *from += share * (*to - *from);
+        for (iterate, quad) in self.iterate.iter_mut().zip(&self.quads) {
+            for (from, to) in iterate.iter_mut().zip(&quad.mean) {
+                let start = from.on(simd);
+                *from = fma(to.on(simd) - start, Four::splat(simd, found), start).into();
             }
         }
-        floor.near(&self.rungs, |corners, _| corners.go(found, law));
+        self.floor.near(&self.quads, |corners, _| corners.go(found, law));
         Search::Part
     }
 }

@@ -1,136 +1,151 @@
 //! The articulated-body recursion in the plane, two arms at a time.
 //!
 //! The chain hangs on its root: the first body if it is clamped, the one in the middle otherwise. The bodies at the same distance from the
-//! root stand on one [`Rung`], the left arm's in lane 0 and the right arm's in lane 1, and both arms are walked in the same instructions. The
-//! root has rung 0, lane 0. Where an arm is shorter its lane holds a body without mass, which changes nothing.
+//! root stand on one rung, the left arm's in lane 0 and the right arm's in lane 1, and both arms are walked in the same instructions. The
+//! root has rung 0, lane 0. Where an arm is shorter its lane holds a body without mass, which changes nothing. Two rungs make a [`Quad`], for
+//! what is done to each body for itself; if their number is odd, the last has bodies without mass.
 //!
 //! A spatial vector is (turn, x, z): of a motion (ω, v) of a body's reference point, of a force (moment about it, f). Turns count
 //! anticlockwise. A body's reference point is its end towards the root; the root's is its left end.
 
+use fearless_simd::{Simd, prelude::*};
 use wide::f64x2;
 
 use super::contact::Law;
 use super::floor::Inwards;
+use super::lanes::{Four, Lanes, fma, on, pair};
 
 /// Turn, x, z.
 type Spatial = [f64; 3];
 /// The same of two bodies.
 pub(super) type Spatials = [f64x2; 3];
+/// The same of four.
+pub(super) type Motions<S> = [Four<S>; 3];
 
 /// The largest turn (rad) for which the series in [`turned`] are exact to the last digit: the first term left out is 6·10⁻¹⁷ of the turn.
 const LARGEST_SERIES: f64 = 0.03;
 
-/// Two bodies: what stays, their state, and what the step at hand needs.
+/// Four bodies: what stays, their state, and what the step at hand needs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Rung {
-    pub(super) mass: f64x2,
+pub(super) struct Quad {
+    pub(super) mass: Lanes,
     /// Share of the robot's mass.
-    pub(super) share: f64x2,
+    pub(super) share: Lanes,
     /// How far the centre of mass of the robot, seen from the root, lies along the links (cm): it is the sum of lever · along.
-    pub(super) lever: f64x2,
+    pub(super) lever: Lanes,
     /// About the centre of mass and about the reference point (g·cm²).
-    pub(super) inertia: f64x2,
-    pub(super) inertia_at_reference: f64x2,
+    pub(super) inertia: Lanes,
+    pub(super) inertia_at_reference: Lanes,
     /// From the reference point to the other end (cm), negative on the left arm.
-    pub(super) reach: f64x2,
+    pub(super) reach: Lanes,
     /// Of the joint at the reference point (dyn·cm/rad); none where there is no body.
-    pub(super) stiffness: f64x2,
+    pub(super) stiffness: Lanes,
     /// What spring and damper of the joint at the reference point add to that joint's inertia.
-    pub(super) implicit: f64x2,
+    pub(super) implicit: Lanes,
     /// Where the centre of mass lies between the reference point (0) and the other end (1).
-    pub(super) middle: f64x2,
+    pub(super) middle: Lanes,
     /// Angle above the x axis (rad), counted anticlockwise.
-    pub(super) angle: f64x2,
+    pub(super) angle: Lanes,
     /// Rate (rad/s) and velocity of the centre of mass (cm/s).
-    pub(super) motion: Spatials,
+    pub(super) motion: [Lanes; 3],
     /// Voltage on the joint as seen from the root: negative on the right arm (V).
-    pub(super) volts: f64x2,
+    pub(super) volts: Lanes,
     /// Angle at which the joint's spring is at rest, body towards the root to this one (rad).
-    pub(super) rest_angle: f64x2,
+    pub(super) rest_angle: Lanes,
     /// The angle that `along`, the direction from left end to right one, is of, and the other end less the reference point (cm).
-    pub(super) posed: f64x2,
-    pub(super) along: [f64x2; 2],
-    pub(super) across: [f64x2; 2],
+    pub(super) posed: Lanes,
+    pub(super) along: [Lanes; 2],
+    pub(super) across: [Lanes; 2],
     /// The centres of mass less the reference points (cm).
-    half: [f64x2; 2],
+    half: [Lanes; 2],
     /// Momentum about the reference point that the mean motion is to have, and the joint's part of it.
-    pub(super) momentum: Spatials,
-    pub(super) torque: f64x2,
+    pub(super) momentum: [Lanes; 3],
+    pub(super) torque: Lanes,
     /// Of the walk to the root: the mean rate is `own` + `carried` · (turn, −x, −z) of the inner body at the reference point.
-    carried: Spatials,
-    own: f64x2,
+    carried: [Lanes; 3],
+    own: Lanes,
     /// Mean motion of the reference point over the step.
-    pub(super) mean: Spatials,
+    pub(super) mean: [Lanes; 3],
 }
 
-impl Rung {
+impl Quad {
     /// Bodies without mass, whose joints do nothing.
     pub(super) fn empty() -> Self {
-        Self { implicit: f64x2::ONE, middle: f64x2::HALF, along: [f64x2::ONE, f64x2::ZERO], ..Self::default() }
+        let one = Lanes::splat(1.0);
+        Self { implicit: one, middle: Lanes::splat(0.5), along: [one, Lanes::ZERO], ..Self::default() }
     }
 
     /// Puts the links where `along` says that they point.
     #[inline(always)]
-    pub(super) fn lay(&mut self) {
-        self.across = self.along.map(|along| self.reach * along);
-        self.half = self.across.map(|part| part * self.middle);
+    pub(super) fn lay<S: Simd>(&mut self, simd: S) {
+        let (reach, middle) = (self.reach.on(simd), self.middle.on(simd));
+        for (k, along) in self.along.iter().enumerate() {
+            let across = reach * along.on(simd);
+            (self.across[k], self.half[k]) = (across.into(), (across * middle).into());
+        }
     }
 
     /// Turns the links to the angles `to` (rad), on from where they were by the series of sine and cosine, which is several times faster than
     /// computing both anew, unless they shall be `exact` or turn far.
     #[inline(always)]
-    pub(super) fn turn_to(&mut self, to: f64x2, exact: bool) {
-        let by = to - self.posed;
-        self.posed = to;
-        let far = by.abs().simd_gt(f64x2::splat(LARGEST_SERIES)).any();
-        self.along = if far || exact { direction(to) } else { turned(self.along, by) };
-        self.lay();
+    pub(super) fn turn_to<S: Simd>(&mut self, to: Four<S>, exact: bool) {
+        let simd = to.simd;
+        let by = to - self.posed.on(simd);
+        self.posed = to.into();
+        let far = by.abs().simd_gt(LARGEST_SERIES).any_true();
+        if far || exact {
+            self.along = direction(self.posed);
+        } else {
+            let [x, z] = turned(on(simd, &self.along), by);
+            self.along = [x.into(), z.into()];
+        }
+        self.lay(simd);
     }
 
     /// Sets the joints' parts of the step's right side, −`share` (s) of their torques at the angles as they are, with the bodies towards the
     /// root at `inner` (rad). The implicit part adds what the mean rate makes.
     #[inline(always)]
-    pub(super) fn load_torque(&mut self, share: f64x2, inner: f64x2) {
-        self.torque = share * self.stiffness * (self.angle - inner - self.rest_angle);
+    pub(super) fn load_torque<S: Simd>(&mut self, share: f64, inner: Four<S>) {
+        let simd = inner.simd;
+        self.torque = (self.stiffness.on(simd) * share * (self.angle.on(simd) - inner - self.rest_angle.on(simd))).into();
     }
 
     /// Mean motion of the centres of mass.
     #[inline(always)]
-    pub(super) fn mean_of_centre(&self) -> Spatials {
-        self.of_centre(self.mean)
+    pub(super) fn mean_of_centre<S: Simd>(&self, simd: S) -> Motions<S> {
+        self.of_centre(on(simd, &self.mean))
     }
 
     /// The motion of the centres of mass where that of the reference points is `motion`.
     #[inline(always)]
-    pub(super) fn of_centre(&self, motion: Spatials) -> Spatials {
+    pub(super) fn of_centre<S: Simd>(&self, motion: Motions<S>) -> Motions<S> {
         let [turn, x, z] = motion;
-        let half = self.half;
-        [turn, x - turn * half[1], z + turn * half[0]]
+        let [half_x, half_z] = on(turn.simd, &self.half);
+        [turn, fma(-turn, half_z, x), fma(turn, half_x, z)]
     }
 
     /// Puts the momentum `about_centre` about the reference point.
     #[inline(always)]
-    pub(super) fn load(&mut self, about_centre: Spatials) {
+    pub(super) fn load<S: Simd>(&mut self, about_centre: Motions<S>) {
         let [turn, x, z] = about_centre;
-        let half = self.half;
-        self.momentum = [turn + half[0] * z - half[1] * x, x, z];
+        let [half_x, half_z] = on(turn.simd, &self.half);
+        self.momentum = [fma(half_x, z, fma(-half_z, x, turn)).into(), x.into(), z.into()];
     }
 }
 
-/// Directions of two angles.
-pub(super) fn direction(angle: f64x2) -> [f64x2; 2] {
-    let angle = angle.to_array();
-    [f64x2::new(angle.map(f64::cos)), f64x2::new(angle.map(f64::sin))]
+/// Directions of angles.
+pub(super) fn direction(angle: Lanes) -> [Lanes; 2] {
+    [angle.map(f64::cos), angle.map(f64::sin)]
 }
 
-/// Two directions turned by small angles (rad): with t the tangent of half an angle, sin = 2 t/(1 + t²) and cos = 1 − t sin.
+/// Directions turned by small angles (rad): with t the tangent of half an angle, sin = 2 t/(1 + t²) and cos = 1 − t sin.
 #[inline(always)]
-fn turned([x, z]: [f64x2; 2], by: f64x2) -> [f64x2; 2] {
-    let c = f64x2::splat;
+fn turned<S: Simd>([x, z]: [Four<S>; 2], by: Four<S>) -> [Four<S>; 2] {
+    let c = |value: f64| Four::splat(by.simd, value);
     let s = by * by;
-    let t = by * (c(0.5) + s * (c(1.0 / 24.0) + s * (c(1.0 / 240.0) + s * c(17.0 / 40320.0))));
-    let sin = (t + t) / (c(1.0) + t * t);
-    [x - sin * (z + t * x), z + sin * (x - t * z)]
+    let t = by * fma(s, fma(s, fma(s, c(17.0 / 40320.0), c(1.0 / 240.0)), c(1.0 / 24.0)), c(0.5));
+    let sin = (t + t) / fma(t, t, c(1.0));
+    [fma(-sin, fma(t, x, z), x), fma(sin, fma(-t, z, x), z)]
 }
 
 /// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms.
@@ -147,27 +162,47 @@ struct Articulated {
     force: Spatial,
 }
 
+/// The joints of two bodies as those towards the root feel them; the default lets nothing through.
+#[derive(Debug, Clone, Copy, Default)]
+struct Joints {
+    /// 1/D with D = I₀₀ + implicit.
+    inverse: f64x2,
+    implicit: f64x2,
+    own: f64x2,
+}
+
 impl Arms {
-    /// Moves from a rung's other ends to its reference points and adds the rung itself.
+    /// Goes through the joints of the bodies outside, moves from a rung's other ends to its reference points, and adds the rung itself.
     ///
-    /// What comes in is added last: a rung waits for the one before as short as can be.
+    /// With c the first column of the inertia I outside, what is felt of it is I − c cᵀ/D, of which the first column is c · implicit/D:
+    /// nothing is lost where a joint is soft. All that can be made of I before 1/D is known is made apart, for 1/D is waited for.
     #[inline(always)]
-    fn take(&mut self, rung: &Rung) {
-        let Self { inertia, force } = self;
-        let [wx, wz] = [-rung.across[1], rung.across[0]];
-        let [i00, i01, i02, i11, i12, i22] = *inertia;
-        let (two_x, two_z) = (wx + wx, wz + wz);
-        let [mx, mz] = rung.half.map(|half| rung.mass * half);
-        let squares = (wx * wx) * i11 + (wz * wz) * i22;
-        let rest = (i00 + rung.inertia_at_reference) + (two_x * wz) * i12;
-        inertia[0] = (squares + rest) + (two_x * i01 + two_z * i02);
-        inertia[1] = (i01 - mz) + (wx * i11 + wz * i12);
-        inertia[2] = (i02 + mx) + (wx * i12 + wz * i22);
-        inertia[3] += rung.mass;
-        inertia[5] += rung.mass;
-        force[0] = (force[0] + rung.momentum[0]) + (wx * force[1] + wz * force[2]);
-        force[1] += rung.momentum[1];
-        force[2] += rung.momentum[2];
+    fn take(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, rung: usize) {
+        let Joints { inverse, implicit, own } = *through;
+        let [wx, wz] = [-across[1], across[0]];
+        let [c0, c1, c2, i11, i12, i22] = self.inertia;
+        let [half_x, half_z] = pair(&quad.half, rung);
+        let (mass, inertia) = (quad.mass.rung(rung), quad.inertia_at_reference.rung(rung));
+        let momentum = pair(&quad.momentum, rung);
+        let [ux, uz] = [fma(wx, i11, wz * i12), fma(wx, i12, wz * i22)];
+        let squares = fma(wx * wx, i11, fma(wz * wz, i22, (wx + wx) * wz * i12));
+        let moved = fma(wx, c1, wz * c2);
+        let soft = implicit - moved;
+        let felt = fma(implicit, c0 + (moved + moved), -(moved * moved));
+        self.inertia = [
+            fma(felt, inverse, inertia + squares),
+            fma(c1 * soft, inverse, fma(-mass, half_z, ux)),
+            fma(c2 * soft, inverse, fma(mass, half_x, uz)),
+            fma(-c1 * c1, inverse, i11 + mass),
+            fma(-c1 * c2, inverse, i12),
+            fma(-c2 * c2, inverse, i22 + mass),
+        ];
+        let [turn, x, z] = self.force;
+        self.force = [
+            fma(-(c0 + moved), own, momentum[0] + fma(wx, x, fma(wz, z, turn))),
+            fma(-c1, own, momentum[1] + x),
+            fma(-c2, own, momentum[2] + z),
+        ];
     }
 
     /// Adds what corners do to the bodies of a rung.
@@ -177,52 +212,50 @@ impl Arms {
         (0..3).for_each(|k| self.force[k] += by.force[k]);
     }
 
-    /// What of it is felt through the joints at the rung's reference points.
-    ///
-    /// With D = I₀₀ + implicit, 1 − I₀₀/D is implicit/D: nothing is lost where a joint is soft.
+    /// Solves the joints at the rung's reference points.
     #[inline(always)]
-    fn through_joints(&mut self, rung: &mut Rung) {
-        let Self { inertia, force } = self;
-        let c = [inertia[0], inertia[1], inertia[2]];
-        let inverse = f64x2::ONE / (c[0] + rung.implicit);
-        rung.carried = [rung.implicit * inverse, c[1] * inverse, c[2] * inverse];
-        rung.own = (rung.torque + force[0]) * inverse;
-        for k in 0..3 {
-            force[k] -= c[k] * rung.own;
-            inertia[k] = c[k] * rung.carried[0];
-        }
-        // These are waited for most: their products do not wait for the division.
-        inertia[3] -= (c[1] * c[1]) * inverse;
-        inertia[4] -= (c[1] * c[2]) * inverse;
-        inertia[5] -= (c[2] * c[2]) * inverse;
+    fn joints(&self, quad: &mut Quad, rung: usize) -> Joints {
+        let implicit = quad.implicit.rung(rung);
+        let inverse = f64x2::ONE / (self.inertia[0] + implicit);
+        let own = (quad.torque.rung(rung) + self.force[0]) * inverse;
+        quad.carried[0].set_rung(rung, implicit * inverse);
+        quad.carried[1].set_rung(rung, self.inertia[1] * inverse);
+        quad.carried[2].set_rung(rung, self.inertia[2] * inverse);
+        quad.own.set_rung(rung, own);
+        Joints { inverse, implicit, own }
     }
 
     /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
-    fn at_root(&self, root: &Rung) -> Articulated {
-        let lane = |value: f64x2, lane: usize| value.as_array()[lane];
-        let mut right = *self;
-        right.inertia.iter_mut().chain(&mut right.force).for_each(|value| *value = f64x2::splat(lane(*value, 1)));
-        right.take(root);
-        let both = |left: f64x2, right: f64x2| lane(left, 0) + lane(right, 0);
+    #[inline(always)]
+    fn at_root(mut self, through: &Joints, root: &Quad) -> Articulated {
+        self.take(through, root_ends(root), root, 0);
         Articulated {
-            inertia: std::array::from_fn(|k| both(self.inertia[k], right.inertia[k])),
-            force: std::array::from_fn(|k| both(self.force[k], right.force[k])),
+            inertia: std::array::from_fn(|k| self.inertia[k].reduce_add()),
+            force: std::array::from_fn(|k| self.force[k].reduce_add()),
         }
     }
+}
+
+/// Where the arms hang on the root, from its reference point (cm): the left one on the point itself, the right one on the other end.
+#[inline(always)]
+fn root_ends(root: &Quad) -> [f64x2; 2] {
+    [0, 1].map(|k| f64x2::new([0.0, root.across[k].lane(0)]))
 }
 
 impl Articulated {
     /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned;
     /// without fractions, so that no division waits for another.
+    #[inline(always)]
     fn motion(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
         let [turn, x, z] = self.force;
-        let (a, b, c) = (i00 * i22 - i02 * i02, i01 * i22 - i12 * i02, i11 * i22 - i12 * i12);
-        let (turn, x) = (turn * i22 - i02 * z, x * i22 - i12 * z);
-        let spin = (turn * c - b * x) / (a * c - b * b);
-        let along = x * (1.0 / c) - spin * (b / c);
+        let less = |a: f64, b: f64, c: f64, d: f64| a.mul_add(b, -(c * d));
+        let (a, b, c) = (less(i00, i22, i02, i02), less(i01, i22, i12, i02), less(i11, i22, i12, i12));
+        let (turn, x) = (less(turn, i22, i02, z), less(x, i22, i12, z));
+        let spin = less(turn, c, b, x) / less(a, c, b, b);
+        let along = less(x, 1.0 / c, spin, b / c);
         let fall = 1.0 / i22;
-        [spin, along, z * fall - spin * (i02 * fall) - along * (i12 * fall)]
+        [spin, along, less(less(z, fall, spin, i02 * fall), 1.0, along, i12 * fall)]
     }
 }
 
@@ -237,28 +270,27 @@ pub(super) enum Hold {
     Hinged,
 }
 
-/// Mean motions u of the whole chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as
-/// their states say.
-pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut floor: Inwards, law: &Law) {
-    let Some((root, arms)) = rungs.split_first_mut() else { return };
-    let mut chain = Arms::default();
-    let mut k = arms.len();
-    for rung in arms.iter_mut().rev() {
-        chain.take(rung);
+/// Mean motions u of the whole chain of so many `rungs`: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor`
+/// as their states say.
+#[inline(always)]
+pub(super) fn solve(quads: &mut [Quad], rungs: usize, hold: Hold, mut floor: Inwards, law: &Law) {
+    let (mut chain, mut through) = (Arms::default(), Joints::default());
+    for k in (1..rungs).rev() {
+        let (quad, rung) = (&mut quads[k / 2], k % 2);
+        chain.take(&through, pair(&quad.across, rung), quad, rung);
         if let Some(by) = floor.take(k, law) {
             chain.touch(&by);
         }
-        k -= 1;
-        chain.through_joints(rung);
+        through = chain.joints(quad, rung);
     }
+    let root = &mut quads[0];
     let motion = if hold == Hold::Clamped {
         [0.0; 3]
     } else if hold == Hold::Hinged {
-        let whole = chain.at_root(root);
-        let [torque, implicit] = [root.torque, root.implicit].map(|value| value.to_array()[0]);
-        [(whole.force[0] + torque) / (whole.inertia[0] + implicit), 0.0, 0.0]
+        let whole = chain.at_root(&through, root);
+        [(whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0)), 0.0, 0.0]
     } else {
-        let mut whole = chain.at_root(root);
+        let mut whole = chain.at_root(&through, root);
         if let Some(by) = floor.take(0, law) {
             (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
             (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
@@ -266,29 +298,40 @@ pub(super) fn solve(rungs: &mut [Rung], hold: Hold, mut floor: Inwards, law: &La
         whole.motion()
     };
     let [mut turn, mut x, mut z] = motion.map(f64x2::splat);
-    root.mean = [turn, x, z];
-    // Lane 0 goes on from the root's reference point, lane 1 from its other end.
-    let mut across = root.across.map(|part| f64x2::new([0.0, part.to_array()[0]]));
-    for rung in arms {
-        let [a, b, c] = rung.carried;
-        let carried = a + (b * across[1] - c * across[0]);
-        let on = carried * turn + (rung.own - (b * x + c * z));
-        (x, z) = (x - turn * across[1], z + turn * across[0]);
+    let set = |quad: &mut Quad, rung: usize, mean: Spatials| (0..3).for_each(|k| quad.mean[k].set_rung(rung, mean[k]));
+    set(root, 0, [turn, x, z]);
+    let mut across = root_ends(root);
+    for k in 1..rungs {
+        let (quad, rung) = (&mut quads[k / 2], k % 2);
+        let [a, b, c] = pair(&quad.carried, rung);
+        let carried = fma(b, across[1], fma(-c, across[0], a));
+        let on = fma(carried, turn, fma(-b, x, fma(-c, z, quad.own.rung(rung))));
+        (x, z) = (fma(-turn, across[1], x), fma(turn, across[0], z));
         turn = on;
-        rung.mean = [turn, x, z];
-        across = rung.across;
+        set(quad, rung, [turn, x, z]);
+        across = pair(&quad.across, rung);
+    }
+    if rungs % 2 == 1 {
+        // Bodies without mass outside of the last follow it.
+        set(&mut quads[rungs / 2], 1, [turn, x, z]);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
+
+    fn turned_by(along: [Lanes; 2], by: f64) -> [Lanes; 2] {
+        dispatch!(Level::new(), simd => turned(on(simd, &along), Four::splat(simd, by)).map(Lanes::from))
+    }
 
     #[test]
     fn turning_by_the_half_angle_is_exact_to_the_last_digits() {
         for k in -1000..=1000 {
             let (by, from) = (LARGEST_SERIES * f64::from(k) / 1000.0, 0.7 * f64::from(k));
-            let found = turned(direction(f64x2::splat(from)), f64x2::splat(by)).map(|part| part.to_array()[0]);
+            let found = turned_by(direction(Lanes::splat(from)), by).map(|part| part.lane(3));
             let exact = [(from + by).cos(), (from + by).sin()];
             // The sum of the angles is rounded too: half a last digit of 700 is 6e-14.
             let allowed = 4.0 * f64::EPSILON + f64::EPSILON * from.abs();
@@ -302,11 +345,11 @@ mod tests {
     #[test]
     fn turning_on_loses_next_to_nothing_before_directions_are_made_anew() {
         let by = 0.9 * LARGEST_SERIES;
-        let mut along = direction(f64x2::ZERO);
+        let mut along = direction(Lanes::ZERO);
         for _ in 0..super::super::EXACT_EVERY {
-            along = turned(along, f64x2::splat(by));
+            along = turned_by(along, by);
         }
-        let [x, z] = along.map(|part| part.to_array()[0]);
+        let [x, z] = along.map(|part| part.lane(0));
         let exact = super::super::EXACT_EVERY as f64 * by;
         let lost = x * exact.sin() - z * exact.cos();
         // Seen: 1.0e-15 rad, and a length of 1 within 4.4e-16.

@@ -5,12 +5,13 @@
 //! implicit terms and a frictionless floor. What is left out is small beside k, so the steps shrink by a constant factor. Without
 //! friction the equilibrium of a robot on the floor does not depend on how it got there; the centre of mass keeps its x.
 
+use fearless_simd::{Simd, dispatch, prelude::*};
 use wide::f64x2;
 
 use super::contact::{Grip, Law};
-use super::floor::{Floor, Inwards};
-use super::recursion::{Rung, direction, solve};
-use super::{Engine, EngineError, PlanarEngine, outwards};
+use super::lanes::{Four, Lanes, Two, inner};
+use super::recursion::{Quad, direction};
+use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
 /// Rigid motions that cost no energy are held by this share of the inertia (1/s²).
@@ -34,74 +35,66 @@ impl PlanarEngine {
             return none("a free robot falls");
         }
         self.prepare(voltages)?;
-        let dynamic = self.rungs.clone();
-        let mut grips = vec![Grip::new(f64x2::ZERO); dynamic.len()];
-        if let Some(floor) = &mut self.floor {
-            floor.swap_grips(&mut grips);
-        }
-        for rung in &mut self.rungs {
-            rung.implicit = rung.stiffness.fast_max(f64x2::ONE);
-            rung.mass *= f64x2::splat(HOLD);
-            rung.inertia *= f64x2::splat(HOLD);
-            rung.inertia_at_reference *= f64x2::splat(HOLD);
-            rung.motion = Default::default();
+        let dynamic = self.quads.clone();
+        let mut grips = vec![Grip::new(f64x2::ZERO); self.rungs];
+        self.floor.swap_grips(&mut grips);
+        let hold = Lanes::splat(HOLD);
+        for quad in &mut self.quads {
+            quad.implicit = quad.stiffness.map(|stiffness| stiffness.max(1.0));
+            quad.mass = quad.mass * hold;
+            quad.inertia = quad.inertia * hold;
+            quad.inertia_at_reference = quad.inertia_at_reference * hold;
+            quad.motion = Default::default();
         }
         self.velocity = [0.0; 2];
         self.finite = false;
-        let settled = self.settle_in_steps(&dynamic);
-        for (rung, real) in self.rungs.iter_mut().zip(&dynamic) {
-            (rung.mass, rung.inertia, rung.implicit) = (real.mass, real.inertia, real.implicit);
-            rung.inertia_at_reference = real.inertia_at_reference;
+        let settled = dispatch!(self.level, simd => self.settle_in_steps(simd, &dynamic));
+        for (quad, real) in self.quads.iter_mut().zip(&dynamic) {
+            (quad.mass, quad.inertia, quad.implicit) = (real.mass, real.inertia, real.implicit);
+            quad.inertia_at_reference = real.inertia_at_reference;
         }
-        if let Some(floor) = &mut self.floor {
-            floor.swap_grips(&mut grips);
-            Floor::clear(floor);
-        }
+        self.floor.swap_grips(&mut grips);
+        self.floor.clear();
         match settled? {
             true => Ok(()),
             false => none("the steps towards it do not end"),
         }
     }
 
-    fn settle_in_steps(&mut self, bodies: &[Rung]) -> Result<bool, EngineError> {
+    #[inline(always)]
+    fn settle_in_steps<S: Simd>(&mut self, simd: S, bodies: &[Quad]) -> Result<bool, EngineError> {
         let weight = (self.mass * self.gravity).max(f64::MIN_POSITIVE);
         let law = Law::statics(weight / GIVE);
-        let pull = self.pull.map(f64x2::splat);
+        let zero = Four::splat(simd, 0.0);
         for _ in 0..LARGEST_STEPS {
-            for (rung, body) in self.rungs.iter_mut().zip(bodies) {
-                rung.posed = rung.angle;
-                rung.along = direction(rung.angle);
-                rung.lay();
-                rung.load([f64x2::ZERO, body.mass * pull[0], body.mass * pull[1]]);
-            }
-            let mut inner = f64x2::ZERO;
-            for (k, rung) in self.rungs.iter_mut().enumerate() {
-                rung.load_torque(-f64x2::ONE, inner);
-                inner = outwards(rung.angle, k);
-            }
-            if let Some(beyond) = &self.beyond {
-                let mut inner = f64x2::splat(self.rungs[0].angle.to_array()[0]);
-                for rung in self.rungs.iter_mut().skip(1) {
-                    rung.torque += beyond.at_rest(rung, rung.angle - inner - rung.rest_angle);
-                    inner = rung.angle;
+            let mut before = Two::splat(simd, 0.0);
+            for (k, (quad, body)) in self.quads.iter_mut().zip(bodies).enumerate() {
+                quad.posed = quad.angle;
+                quad.along = direction(quad.angle);
+                quad.lay(simd);
+                let mass = body.mass.on(simd);
+                quad.load([zero, mass * self.pull[0], mass * self.pull[1]]);
+                let (inner, last) = inner(quad.angle.on(simd), before);
+                quad.load_torque(-1.0, inner);
+                if let Some(beyond) = &self.beyond {
+                    quad.torque += beyond.at_rest(k, quad, quad.angle - inner.into() - quad.rest_angle);
                 }
+                before = last;
             }
-            if !self.solve_on_floor(&law)? {
-                solve(&mut self.rungs, self.hold, Inwards::default(), &law);
-            }
-            let turns = self.rungs.iter().flat_map(|rung| rung.mean[0].to_array());
+            self.solve_on_floor(simd, &law)?;
+            let turns = self.quads.iter().flat_map(|quad| quad.mean[0].to_array());
             let largest = turns.map(f64::abs).fold(0.0, f64::max);
             if !largest.is_finite() {
                 return Ok(false);
             }
             let share = (LARGEST_TURN / largest).min(1.0);
-            let mut rise = f64x2::ZERO;
-            for rung in &mut self.rungs {
-                let mean = rung.mean_of_centre();
-                rung.angle += f64x2::splat(share) * mean[0];
-                rise += rung.share * mean[2];
+            let mut rise = zero;
+            for quad in &mut self.quads {
+                let [turn, _, z] = quad.mean_of_centre(simd);
+                quad.angle = (quad.angle.on(simd) + turn * share).into();
+                rise += quad.share.on(simd) * z;
             }
-            let rise = rise.reduce_add();
+            let rise = Lanes::from(rise).sum();
             if self.mount != Mount::Clamped {
                 self.centre[1] += share * rise;
             }

@@ -1,0 +1,164 @@
+//! Four bodies in the lanes of one number, and the registers of this machine for them.
+//!
+//! Products and sums are rounded once ([`fma`]): a third fewer instructions, and the same bits whatever the width of the registers. Machines
+//! that cannot do so in hardware (x86-64 from before 2013) find the same bits slowly.
+
+use std::array::from_fn;
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+use fearless_simd::{Simd, SimdFloat, prelude::*};
+use wide::f64x2;
+
+/// One number of four bodies: left and right arm's on a rung, then the same on the next rung outwards.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[repr(align(32))]
+pub(super) struct Lanes([f64; 4]);
+
+/// The same in a register.
+pub(super) type Four<S> = fearless_simd::f64x4<S>;
+/// Half of one: a rung.
+pub(super) type Two<S> = fearless_simd::f64x2<S>;
+
+impl Lanes {
+    pub(super) const ZERO: Self = Self([0.0; 4]);
+
+    pub(super) fn new(values: [f64; 4]) -> Self {
+        Self(values)
+    }
+
+    pub(super) fn splat(value: f64) -> Self {
+        Self([value; 4])
+    }
+
+    #[inline(always)]
+    pub(super) fn on<S: Simd>(&self, simd: S) -> Four<S> {
+        Four::simd_from(simd, self.0)
+    }
+
+    pub(super) fn to_array(self) -> [f64; 4] {
+        self.0
+    }
+
+    pub(super) fn map(self, of: impl Fn(f64) -> f64) -> Self {
+        Self(from_fn(|i| of(self.0[i])))
+    }
+
+    pub(super) fn abs(self) -> Self {
+        self.map(f64::abs)
+    }
+
+    /// In an order of its own: a register's sum need not have the same on every machine.
+    #[inline(always)]
+    pub(super) fn sum(self) -> f64 {
+        let [a, b, c, d] = self.0;
+        (a + c) + (b + d)
+    }
+
+    pub(super) fn lane(&self, lane: usize) -> f64 {
+        self.0[lane]
+    }
+
+    pub(super) fn set_lane(&mut self, lane: usize, to: f64) {
+        self.0[lane] = to;
+    }
+
+    /// The two bodies of the first (0) or the second (1) of the rungs.
+    #[inline(always)]
+    pub(super) fn rung(&self, which: usize) -> f64x2 {
+        f64x2::new(self.0.as_chunks().0[which])
+    }
+
+    #[inline(always)]
+    pub(super) fn set_rung(&mut self, which: usize, to: f64x2) {
+        self.0.as_chunks_mut().0[which] = to.to_array();
+    }
+
+    /// What it is for the rungs one further inwards, with the one `before` all these.
+    pub(super) fn inner(self, before: f64x2) -> Self {
+        let ([a, b], [c, d, ..]) = (before.to_array(), self.0);
+        Self([a, b, c, d])
+    }
+}
+
+/// The two bodies of one rung, of some numbers.
+#[inline(always)]
+pub(super) fn pair<const N: usize>(of: &[Lanes; N], rung: usize) -> [f64x2; N] {
+    from_fn(|k| of[k].rung(rung))
+}
+
+/// The same in registers, of all four bodies.
+#[inline(always)]
+pub(super) fn on<const N: usize, S: Simd>(simd: S, of: &[Lanes; N]) -> [Four<S>; N] {
+    from_fn(|k| of[k].on(simd))
+}
+
+/// [`Lanes::inner`], and the last rung's, which is before those that follow.
+#[inline(always)]
+pub(super) fn inner<S: Simd>(values: Four<S>, before: Two<S>) -> (Four<S>, Two<S>) {
+    let (first, second) = values.split();
+    (before.combine(first), second)
+}
+
+impl<S: Simd> From<Four<S>> for Lanes {
+    #[inline(always)]
+    fn from(values: Four<S>) -> Self {
+        Self(values.into())
+    }
+}
+
+macro_rules! in_each_lane {
+    ($operation:ident, $name:ident, $sign:tt) => {
+        impl $operation for Lanes {
+            type Output = Self;
+
+            fn $name(self, other: Self) -> Self {
+                Self(from_fn(|i| self.0[i] $sign other.0[i]))
+            }
+        }
+    };
+}
+in_each_lane!(Add, add, +);
+in_each_lane!(Sub, sub, -);
+in_each_lane!(Mul, mul, *);
+
+impl Neg for Lanes {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        self.map(|value| -value)
+    }
+}
+
+impl AddAssign for Lanes {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+/// Numbers whose products and sums can be rounded once.
+pub(super) trait Fused {
+    /// self · by + and.
+    fn times(self, by: Self, and: Self) -> Self;
+}
+
+impl<S: Simd> Fused for Four<S> {
+    #[inline(always)]
+    fn times(self, by: Self, and: Self) -> Self {
+        self.mul_add_precise(by, and)
+    }
+}
+
+impl Fused for f64x2 {
+    /// The compiler makes one instruction of both where there is one.
+    #[inline(always)]
+    fn times(self, by: Self, and: Self) -> Self {
+        let (a, b, c) = (self.to_array(), by.to_array(), and.to_array());
+        Self::new([a[0].mul_add(b[0], c[0]), a[1].mul_add(b[1], c[1])])
+    }
+}
+
+/// a·b + c, rounded once.
+#[inline(always)]
+pub(super) fn fma<T: Fused>(a: T, b: T, c: T) -> T {
+    a.times(b, c)
+}
