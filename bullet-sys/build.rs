@@ -55,6 +55,9 @@ fn compile_shim(bullet: &pkg_config::Library) {
     for (name, value) in &bullet.defines {
         build.define(name, value.as_deref());
     }
+    if env::var_os("CARGO_FEATURE_AS_SHIPPED").is_some() {
+        build.define("BULLET_SHIM_AS_SHIPPED", None);
+    }
     for source in SOURCES {
         let path = format!("shim/{source}");
         println!("cargo::rerun-if-changed={path}");

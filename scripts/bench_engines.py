@@ -1,6 +1,6 @@
 """Wall time per simulated second: the planar engine beside its peers, for docs/performance.md.
 
-Usage: .venv/bin/python scripts/bench_engines.py
+Usage: bash scripts/as_shipped.sh && .venv/bin/python scripts/bench_engines.py
 
 The robot of five actuators that jumps in place at 14 Hz, and the cantilever under a constant voltage, both with m = 3. All peers run in
 turn, so that a noisy machine treats all alike; ratios are of medians, seven rounds. Set-up is not counted.
@@ -8,7 +8,8 @@ turn, so that a noisy machine treats all alike; ratios are of medians, seven rou
 - reference: a loop on PyBullet with the reference's own calls, at the reference's step of 2e-5/240 s. Nobody can wait for a second of it:
   its steps per second are taken over 0.5 s of the same motion by 1e-5 s.
 - PyBullet: the leanest loop at 1e-5 s.
-- Bullet: this program's engine at 1e-5 s.
+- Bullet as shipped: this program's engine at 1e-5 s, with all that Bullet can do left to Bullet's own code.
+- Bullet: the same with the shim's faster code.
 - MuJoCo: the exported model, stepped in C by mujoco.rollout on one thread, at the longest step at which its jump is within 3 % of its own
   converged height, with the fastest integrator that keeps that.
 - planar: this program's other engine at 1e-4 s.
@@ -30,7 +31,9 @@ import bench
 
 ROUNDS = 7
 REFERENCE_STEP = 2e-5 / 240
+AS_SHIPPED = bench.SFERS.parent.parent / "as-shipped/release/sfers"
 SECONDS = 1.2
+PEERS = ["reference", "PyBullet", "Bullet as shipped", "Bullet", "MuJoCo", "planar"]
 CANTILEVER = bench.CANTILEVER.split("[simulation]")[0] + "[simulation]\ntime_step_s = 1e-5\nduration_s = 0.5\n"
 
 
@@ -38,10 +41,10 @@ def preset(name):
     return subprocess.run([bench.SFERS, "preset", name], capture_output=True, text=True, check=True).stdout
 
 
-def run(text, folder, *settings):
+def run(text, folder, *settings, program=bench.SFERS):
     """Wall seconds per simulated second of `sfers run`, its measures, and the resolved experiment."""
     out = folder / "run.npz"
-    command = [bench.SFERS, "run", "-", "--json", "--quiet", "--out", out]
+    command = [program, "run", "-", "--json", "--quiet", "--out", out]
     for setting in settings:
         command += ["--set", setting]
     result = json.loads(subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout)
@@ -127,7 +130,7 @@ def main():
         integrator, code, step = model.choose()
         print(f"MuJoCo: {integrator} at {step:g} s\n", flush=True)
         for title, text in (("five actuators jumping at 14 Hz", jump), ("cantilever", CANTILEVER)):
-            walls = {"reference": [], "PyBullet": [], "Bullet": [], "MuJoCo": [], "planar": []}
+            walls = {peer: [] for peer in PEERS}
             mover = model if text is jump else MuJoCo(text, folder)
             seconds = SECONDS if text is jump else 0.5
             bullet = [f"simulation.duration_s={seconds}", f"simulation.record_every_s={seconds}"]
@@ -136,6 +139,7 @@ def main():
             peers = {
                 "reference": lambda: 1 / REFERENCE_STEP / bench.pybullet(spec, "reference"),
                 "PyBullet": lambda: 1e5 / bench.pybullet(spec, "lean"),
+                "Bullet as shipped": lambda: run(text, folder, *bullet, program=AS_SHIPPED)[0],
                 "Bullet": lambda: run(text, folder, *bullet)[0],
                 "MuJoCo": lambda: mover.roll(step, code, seconds)[0],
             }
@@ -146,11 +150,10 @@ def main():
                     walls["planar"].append(run(text, folder, *planar)[0])
             medians = {peer: statistics.median(values) for peer, values in walls.items()}
             rows.append((title, medians))
-    peers = ["reference", "PyBullet", "Bullet", "MuJoCo", "planar"]
-    print("| | " + " | ".join(peers) + " |\n| --- |" + " --- |" * len(peers))
+    print("| | " + " | ".join(PEERS) + " |\n| --- |" + " --- |" * len(PEERS))
     for title, medians in rows:
-        print(f"| {title}: wall s per simulated s | " + " | ".join(f"{medians[peer]:.3g}" for peer in peers) + " |")
-        print("| – times the planar engine's | " + " | ".join(f"{medians[peer] / medians['planar']:,.0f}" for peer in peers) + " |")
+        print(f"| {title}: wall s per simulated s | " + " | ".join(f"{medians[peer]:.3g}" for peer in PEERS) + " |")
+        print("| – times the planar engine's | " + " | ".join(f"{medians[peer] / medians['planar']:,.0f}" for peer in PEERS) + " |")
 
 
 if __name__ == "__main__":

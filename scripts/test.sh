@@ -2,8 +2,8 @@
 # All set-up and all tests, on a fresh Debian 12 with Rust.
 #
 #   bash scripts/test.sh          the tests of `cargo test`, the live PyBullet check among them
-#   bash scripts/test.sh --long   besides: the shim under sanitizers, a run under valgrind, the whole reproduction of
-#                                 the paper (some minutes), the refusal of a machine without Bullet
+#   bash scripts/test.sh --long   besides: the shim under sanitizers, its bytes against Bullet's as shipped, a run under valgrind, the
+#                                 whole reproduction of the paper (some minutes), the refusal of a machine without Bullet
 #   bash scripts/test.sh --hidden besides the first: every effect hidden in data and looked for, which takes long
 #
 # CI sets CI=true, which means --long.
@@ -27,6 +27,8 @@ cargo test --release --locked --workspace
 if $long; then
   step "shim under ASan, UBSan and TSan"
   bash scripts/sanitize.sh
+  step "the shim's rows against Bullet's own"
+  bash scripts/as_shipped.sh
   step "one short run under valgrind"
   bash scripts/valgrind.sh
   step "the whole paper"

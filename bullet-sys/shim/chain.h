@@ -8,6 +8,13 @@
 
 namespace bs {
 
+// Whether all rows are left to Bullet's own code, for comparing with it.
+#ifdef BULLET_SHIM_AS_SHIPPED
+constexpr bool AS_SHIPPED = true;
+#else
+constexpr bool AS_SHIPPED = false;
+#endif
+
 // For every row of a constraint Bullet computes a Jacobian (btMultiBody::fillConstraintJacobianMultiDof) and the accelerations by a
 // unit force along it (calcAccelerationDeltasMultiDof). Here the same scalar operations are done in the same order, so the results
 // have the same bits, but

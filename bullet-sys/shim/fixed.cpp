@@ -20,7 +20,10 @@ FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, co
 void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
                                            const btContactSolverInfo &info) {
   btMultiBody *body = m_bodyA;
-  if (!chain_.read(*body)) return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
+  // A compliance is none of Bullet's.
+  if ((AS_SHIPPED && compliance_ == 0) || !chain_.read(*body)) {
+    return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
+  }
 
   const int freedoms = body->getNumDofs() + 6;
   if (body->getCompanionId() < 0) {
