@@ -144,6 +144,15 @@ pub(super) struct Corners {
     impulse: [f64x2; 2],
 }
 
+/// What a search finds on its way to a solution.
+pub(super) enum Aim {
+    /// Corners whose states are the same at both ends, and therefore between, for the law's pieces are convex: by how much their impulses
+    /// along the way fall over all of it.
+    Stays(f64),
+    /// Others: impulse along the way at its end, if the iterate's pieces went so far.
+    Changes(f64),
+}
+
 #[inline(always)]
 fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
     fma(a[0], b[0], a[1] * b[1])
@@ -311,6 +320,10 @@ impl Corners {
     #[inline(always)]
     pub(super) fn agrees(&mut self, mean: &Spatials, law: &Law) -> bool {
         (self.asked, self.impulse) = self.law(self.velocity_in(mean), law);
+        self.is_as_asked()
+    }
+
+    fn is_as_asked(&self) -> bool {
         !self.asked.0.simd_ne(self.touch.0).any()
     }
 
@@ -321,12 +334,16 @@ impl Corners {
         self.touch = self.asked;
     }
 
-    /// Prepares a search from the iterate to `mean`; returns impulse·step at the iterate as the piece extends it to the end.
+    /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).
     #[inline(always)]
-    pub(super) fn aim(&mut self, mean: &Spatials, law: &Law) -> f64x2 {
+    pub(super) fn aim(&mut self, mean: &Spatials, law: &Law) -> Aim {
         let to = self.velocity_in(mean);
         self.step = [to[0] - self.velocity[0], to[1] - self.velocity[1]];
-        self.product(self.touch, [self.target[0] - to[0], self.target[1] - to[1]], self.step, law)
+        if self.is_as_asked() {
+            return Aim::Stays(self.product(self.touch, self.step, self.step, law).reduce_add());
+        }
+        let left = [self.target[0] - to[0], self.target[1] - to[1]];
+        Aim::Changes(self.product(self.touch, left, self.step, law).reduce_add())
     }
 
     /// The iterate's velocity at the share `t` of the search.

@@ -3,7 +3,7 @@
 use wide::f64x2;
 
 use super::LARGEST_FRICTION;
-use super::contact::{Corners, Grip, Law, Touch};
+use super::contact::{Aim, Corners, Grip, Law, Touch};
 use super::lanes::{fma, pair};
 use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
@@ -19,6 +19,8 @@ pub(super) struct Floor {
     half_thickness: f64,
     /// Places, in their order.
     near: Vec<usize>,
+    /// Those of them that change their states on the way of a search.
+    changing: Vec<usize>,
     /// How many times corners were looked for.
     looks: u64,
 }
@@ -60,7 +62,8 @@ impl Floor {
     pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
         let grips: Vec<Grip> = frictions.iter().map(|pair| Grip::new(f64x2::new(*pair))).collect();
         let corners: Vec<Corners> = grips.iter().flat_map(|grip| [Corners::new(*grip); 2]).collect();
-        Self { near: Vec::with_capacity(corners.len()), corners, grips, surface, half_thickness, looks: 0 }
+        let places = || Vec::with_capacity(corners.len());
+        Self { near: places(), changing: places(), corners, grips, surface, half_thickness, looks: 0 }
     }
 
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
@@ -168,12 +171,30 @@ impl Floor {
         }
     }
 
-    /// The sums of `of` over the near corners, one after the other.
+    /// Prepares all near corners for a search: sums of what [`Aim`] tells of those that stay, and of those that change.
     #[inline(always)]
-    pub(super) fn sum(&self, of: impl Fn(&Corners) -> [f64x2; 2]) -> [f64; 2] {
-        self.near.iter().fold([0.0; 2], |sum, &place| {
-            let [a, b] = of(&self.corners[place]).map(f64x2::to_array);
-            [sum[0] + a[0] + a[1], sum[1] + b[0] + b[1]]
+    pub(super) fn aim(&mut self, quads: &[Quad], law: &Law) -> [f64; 2] {
+        self.changing.clear();
+        let mut sums = [0.0; 2];
+        for &place in &self.near {
+            let mean = pair(&quads[place / 4].mean, place / 2 % 2);
+            match self.corners[place].aim(&mean, law) {
+                Aim::Stays(fall) => sums[0] += fall,
+                Aim::Changes(end) => {
+                    sums[1] += end;
+                    self.changing.push(place);
+                }
+            }
+        }
+        sums
+    }
+
+    /// Impulse along the way and its slope at the share `t` of a search, summed over the corners that change, one after the other.
+    #[inline(always)]
+    pub(super) fn search(&self, t: f64, law: &Law) -> [f64; 2] {
+        self.changing.iter().fold([0.0; 2], |sum, &place| {
+            let [along, slope] = self.corners[place].search(t, law);
+            [sum[0] + along.reduce_add(), sum[1] + slope.reduce_add()]
         })
     }
 

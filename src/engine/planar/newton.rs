@@ -97,7 +97,8 @@ impl PlanarEngine {
 
     /// Lowers the cost between the iterate and the rungs' mean motion, and moves the iterate there.
     ///
-    /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces.
+    /// With d the way, f'(t) = λ₁·d − (1 − t) dᵀAd − λ(t)·d, where λ₁ is the impulse at the end by the iterate's linear pieces. Of corners
+    /// that stay on their pieces λ₁·d − λ(t)·d is linear in 1 − t, and goes into dᵀAd.
     #[inline(always)]
     fn search<S: Simd>(&mut self, simd: S, law: &Law) -> Search {
         let zero = Four::splat(simd, 0.0);
@@ -117,13 +118,10 @@ impl PlanarEngine {
             kinetic += mass * fma(x, x, z * z) + inertia * turn * turn;
         }
         let (metric, kinetic) = (Lanes::from(metric).sum(), Lanes::from(kinetic).sum());
-        let mut end = 0.0;
-        self.floor.near(&self.quads, |corners, mean| {
-            let [a, b] = corners.aim(mean, law).to_array();
-            end = end + a + b;
-        });
+        let [fall, end] = self.floor.aim(&self.quads, law);
+        let metric = metric + fall;
         let slope_at = |t: f64| {
-            let [along, slope] = self.floor.sum(|corners| corners.search(t, law));
+            let [along, slope] = self.floor.search(t, law);
             (end - (1.0 - t) * metric - along, metric - slope)
         };
         let start = -slope_at(0.0).0;
