@@ -1,7 +1,8 @@
 //! Four bodies in the lanes of one number, and the registers of this machine for them.
 //!
-//! Products and sums are rounded once ([`fma`]): a third fewer instructions, and the same bits whatever the width of the registers. Machines
-//! that cannot do so in hardware (x86-64 from before 2013) find the same bits slowly.
+//! The registers of the machine at hand are chosen when a program runs (`dispatch!`); what is to be computed in them must be inlined there. Products
+//! and sums are rounded once ([`fma`]), so the bits are the same in all registers. Machines that cannot do so in hardware (x86-64 from before
+//! 2013) find them slowly.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};

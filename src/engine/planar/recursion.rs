@@ -249,13 +249,14 @@ impl Articulated {
     fn motion(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
         let [turn, x, z] = self.force;
+        // a·b − c·d.
         let less = |a: f64, b: f64, c: f64, d: f64| a.mul_add(b, -(c * d));
         let (a, b, c) = (less(i00, i22, i02, i02), less(i01, i22, i12, i02), less(i11, i22, i12, i12));
         let (turn, x) = (less(turn, i22, i02, z), less(x, i22, i12, z));
         let spin = less(turn, c, b, x) / less(a, c, b, b);
         let along = less(x, 1.0 / c, spin, b / c);
         let fall = 1.0 / i22;
-        [spin, along, less(less(z, fall, spin, i02 * fall), 1.0, along, i12 * fall)]
+        [spin, along, less(z, fall, spin, i02 * fall) - along * (i12 * fall)]
     }
 }
 
