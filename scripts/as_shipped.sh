@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The shim's own rows and sweeps against Bullet's as Debian ships it: the same bytes.
 #
+# Recordings are compared as CSV, all digits of them: an NPZ holds the minute of its making.
 # The second program is built in target/as-shipped and stays there, for scripts/bench_engines.py too.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -12,10 +13,10 @@ cargo build --release --locked --bin sfers
 cargo build --release --locked --bin sfers --features bullet-as-shipped --target-dir target/as-shipped
 for preset in cantilever-dc jump-14hz full-frictional-inchworm; do
   for build in target/release target/as-shipped/release; do
-    "$build/sfers" preset "$preset" | "$build/sfers" run - --quiet --set simulation.engine=bullet --set simulation.duration_s=0.1 --out "$folder/out.npz" \
-      > /dev/null
-    mv "$folder/out.npz" "$folder/$(echo "$build" | tr / -).npz"
+    "$build/sfers" preset "$preset" \
+      | "$build/sfers" run - --quiet --set simulation.engine=bullet --set simulation.duration_s=0.1 --out "$folder/out.csv" > /dev/null
+    mv "$folder/out.csv" "$folder/$(echo "$build" | tr / -).csv"
   done
-  cmp "$folder/target-release.npz" "$folder/target-as-shipped-release.npz"
+  cmp "$folder/target-release.csv" "$folder/target-as-shipped-release.csv"
   echo "$preset: the same bytes"
 done
