@@ -372,6 +372,36 @@ impl Corners {
 mod tests {
     use super::*;
 
+    /// Impulses along the way to a solution on the same pieces are linear: between, the law itself says what [`Aim::Stays`] does.
+    #[test]
+    fn corners_that_stay_on_their_pieces_fall_by_what_a_search_is_told() {
+        let law = Law::new(1e-4, 0.5, 1.0);
+        let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
+        let start = Corners { near, ..Corners::new(Grip::new(f64x2::splat(0.5))) };
+        let (mut stay, mut change) = (0, 0);
+        // Velocities about the tip of the law's cones: sticking, sliding both ways, open.
+        let around = |k: i32| [f64::from(k % 5) - 2.0, f64::from(k / 5) - 2.0].map(|part| f64x2::new([part, 0.4 * part - 0.1]));
+        for (from, to) in (0..25).flat_map(|from| (0..25).map(move |to| (from, to))) {
+            let mut corners = start;
+            let still = |v: [f64x2; 2]| [f64x2::ZERO, v[0], v[1]];
+            corners.agrees(&still(around(from)), &law);
+            corners.accept(&still(around(from)));
+            corners.agrees(&still(around(to)), &law);
+            let Aim::Stays(fall) = corners.aim(&still(around(to)), &law) else {
+                change += 1;
+                continue;
+            };
+            stay += 1;
+            let along = [0.0, 0.3, 1.0].map(|t| corners.search(t, &law)[0].reduce_add());
+            for (t, along_at) in [(0.3, along[1]), (1.0, along[2])] {
+                let lost = along[0] - along_at;
+                // Of rounding: velocities and ways are of order one.
+                assert!((lost - t * fall).abs() <= 1e-14 * law.stiffness, "{from} {to} {t}: {lost} {fall}");
+            }
+        }
+        assert!(stay > 50 && change > 50, "{stay} {change}");
+    }
+
     /// |0| ≤ 0 · (−1) must not hold a corner down that leaves a floor without friction.
     #[test]
     fn a_corner_that_leaves_the_floor_is_not_held() {

@@ -166,8 +166,7 @@ impl Floor {
     #[inline(always)]
     pub(super) fn near(&mut self, quads: &[Quad], mut each: impl FnMut(&mut Corners, &Spatials)) {
         for &place in &self.near {
-            let mean = pair(&quads[place / 4].mean, place / 2 % 2);
-            each(&mut self.corners[place], &mean);
+            each(&mut self.corners[place], &mean_at(place, quads));
         }
     }
 
@@ -177,8 +176,7 @@ impl Floor {
         self.changing.clear();
         let mut sums = [0.0; 2];
         for &place in &self.near {
-            let mean = pair(&quads[place / 4].mean, place / 2 % 2);
-            match self.corners[place].aim(&mean, law) {
+            match self.corners[place].aim(&mean_at(place, quads), law) {
                 Aim::Stays(fall) => sums[0] += fall,
                 Aim::Changes(end) => {
                     sums[1] += end;
@@ -257,6 +255,12 @@ impl Inwards<'_> {
         }
         touch.then_some(bodies)
     }
+}
+
+/// Mean motion of the bodies of a place.
+#[inline(always)]
+fn mean_at(place: usize, quads: &[Quad]) -> Spatials {
+    pair(&quads[place / 4].mean, place / 2 % 2)
 }
 
 /// From a rung's reference points to the next one's: along each arm; from the root, lane 0 stays and lane 1 goes to the root's other end.

@@ -1,13 +1,13 @@
 //! Four bodies in the lanes of one number, and the registers of this machine for them.
 //!
 //! The registers of the machine at hand are chosen when a program runs (`dispatch!`); what is to be computed in them must be inlined there. Products
-//! and sums are rounded once ([`fma`]), so the bits are the same in all registers. Machines that cannot do so in hardware (x86-64 from before
-//! 2013) find them slowly.
+//! and sums are rounded once ([`fma`]), so the bits are the same in all registers. Where there is no such instruction (x86-64 from before 2013) they are
+//! calls of the C library.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-use fearless_simd::{Simd, SimdFloat, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 use wide::f64x2;
 
 /// One number of four bodies: left and right arm's on a rung, then the same on the next rung outwards.
