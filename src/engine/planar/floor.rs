@@ -1,9 +1,11 @@
 //! All corners of the robot over the floor: which may touch during a step, and what they do to their bodies.
 
+use std::ops::Range;
+
 use wide::f64x2;
 
 use super::LARGEST_FRICTION;
-use super::contact::{Aim, Corners, Grip, Law, Touch};
+use super::contact::{Corners, Grip, Law, Touch};
 use super::lanes::{fma, pair};
 use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
@@ -156,32 +158,40 @@ impl Floor {
         }
     }
 
-    /// The corners that may touch, for the walk to the root.
-    #[inline(always)]
-    pub(super) fn inwards(&self) -> Inwards<'_> {
-        Inwards { corners: &self.corners, near: &self.near }
+    /// Where all near corners are listed.
+    pub(super) fn all(&self) -> Range<usize> {
+        0..self.near.len()
     }
 
-    /// Calls `each` with all near corners and the mean motions of their bodies.
+    /// Where those of `rungs` are.
+    pub(super) fn among(&self, rungs: &Range<usize>) -> Range<usize> {
+        let [start, end] = [rungs.start, rungs.end].map(|rung| self.near.partition_point(|place| *place < 2 * rung));
+        start..end
+    }
+
+    /// Listed corners, for the walk to the root.
     #[inline(always)]
-    pub(super) fn near(&mut self, quads: &[Quad], mut each: impl FnMut(&mut Corners, &Spatials)) {
-        for &place in &self.near {
-            each(&mut self.corners[place], &mean_at(place, quads));
+    pub(super) fn inwards(&self, among: &Range<usize>) -> Inwards<'_> {
+        Inwards { corners: &self.corners, near: &self.near[among.clone()] }
+    }
+
+    /// Calls `each` with the rungs of listed corners, with these and the mean motions of their bodies.
+    #[inline(always)]
+    pub(super) fn near(&mut self, among: &Range<usize>, quads: &[Quad], mut each: impl FnMut(usize, &mut Corners, &Spatials)) {
+        for &place in &self.near[among.clone()] {
+            each(place / 2, &mut self.corners[place], &mean_at(place, quads));
         }
     }
 
-    /// Prepares all near corners for a search: sums of what [`Aim`] tells of those that stay, and of those that change.
+    /// Prepares listed corners for a search: sums of what [`Corners::aim`] tells of those that change.
     #[inline(always)]
-    pub(super) fn aim(&mut self, quads: &[Quad], law: &Law) -> [f64; 2] {
+    pub(super) fn aim(&mut self, among: &Range<usize>, quads: &[Quad], law: &Law) -> [f64; 2] {
         self.changing.clear();
         let mut sums = [0.0; 2];
-        for &place in &self.near {
-            match self.corners[place].aim(&mean_at(place, quads), law) {
-                Aim::Stays(fall) => sums[0] += fall,
-                Aim::Changes(end) => {
-                    sums[1] += end;
-                    self.changing.push(place);
-                }
+        for &place in &self.near[among.clone()] {
+            if let Some(changing) = self.corners[place].aim(&mean_at(place, quads), law) {
+                sums = [0, 1].map(|k| sums[k] + changing[k]);
+                self.changing.push(place);
             }
         }
         sums

@@ -29,7 +29,8 @@
 //! so a corner never passes the floor: it stops on it, without bounce. Friction is the convex model of Anitescu: its minimum is unique, and
 //! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. [`FrictionModel::Coulomb`] takes that lift off again by a damped
 //! fixed-point iteration over such problems (De Saxcé). Newton's method over the corners' states (open, sticking, sliding) puts active
-//! corners into the recursion as terms of their bodies' inertia.
+//! corners into the recursion as terms of their bodies' inertia. In long chains the parts where corners change are solved by themselves in
+//! between.
 //!
 //! # References
 //!
@@ -53,7 +54,8 @@ use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
-use self::recursion::{Hold, Motions, Quad, direction};
+use self::newton::LONGEST_WHOLE;
+use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
@@ -111,6 +113,10 @@ pub struct PlanarEngine {
     friction: FrictionModel,
     /// Mean motions of the reference points in the iterate of the contact problem.
     iterate: Vec<[Lanes; 3]>,
+    /// Of each block of rungs, if there are enough for solving in parts: one for the whole chain otherwise.
+    outside: Vec<Outside>,
+    /// Blocks with corners that a solution asks for other states.
+    asking: Vec<bool>,
     law: Law,
     weight: f64,
     /// Of the machine's registers.
@@ -161,6 +167,7 @@ impl PlanarEngine {
         let clamped = robot.mount == Mount::Clamped;
         let root = if clamped { 0 } else { count / 2 };
         let rungs = root.max(count - 1 - root) + 1;
+        let blocks = if rungs > LONGEST_WHOLE { rungs.div_ceil(BLOCK) } else { 0 };
         let mut quads = vec![Quad::empty(); rungs.div_ceil(2)];
         let mut frictions = vec![[0.0; 2]; rungs];
         for (i, segment) in segments.iter().enumerate() {
@@ -227,6 +234,8 @@ impl PlanarEngine {
             },
             friction: FrictionModel::default(),
             iterate: vec![[Lanes::ZERO; 3]; quads.len()],
+            outside: vec![Outside::default(); blocks],
+            asking: vec![false; blocks],
             quads,
             rungs,
             law: Law::new(time_step, weight, mass / count as f64),

@@ -8,6 +8,8 @@
 //! A spatial vector is (turn, x, z): of a motion (ω, v) of a body's reference point, of a force (moment about it, f). Turns count
 //! anticlockwise. A body's reference point is its end towards the root; the root's is its left end.
 
+use std::ops::Range;
+
 use fearless_simd::{Simd, prelude::*};
 use wide::f64x2;
 
@@ -64,6 +66,8 @@ pub(super) struct Quad {
     /// Of the walk to the root: the mean rate is `own` + `carried` · (turn, −x, −z) of the inner body at the reference point.
     carried: [Lanes; 3],
     own: Lanes,
+    /// What the joint's rate is accelerated by: its articulated inertia and the implicit part. None for the root.
+    pivot: Lanes,
     /// Mean motion of the reference point over the step.
     pub(super) mean: [Lanes; 3],
 }
@@ -116,6 +120,16 @@ impl Quad {
         self.of_centre(on(simd, &self.mean))
     }
 
+    /// What the way of these bodies adds to way · matrix · way of the newest solution: by each joint, its pivot times the square of what it
+    /// turns by itself, for the recursion makes the matrix diagonal. With the `inner` ones' rates.
+    #[inline(always)]
+    pub(super) fn metric<S: Simd>(&self, way: Motions<S>, inner: Four<S>) -> Four<S> {
+        let [turn, x, z] = way;
+        let [a, b, c] = on(inner.simd, &self.carried);
+        let own = fma(-a, inner, turn) + fma(b, x, c * z);
+        self.pivot.on(inner.simd) * own * own
+    }
+
     /// The motion of the centres of mass where that of the reference points is `motion`.
     #[inline(always)]
     pub(super) fn of_centre<S: Simd>(&self, motion: Motions<S>) -> Motions<S> {
@@ -157,7 +171,7 @@ pub(super) struct Arms {
 
 /// The same of one body.
 #[derive(Debug, Clone, Copy, Default)]
-struct Articulated {
+pub(super) struct Articulated {
     inertia: [f64; 6],
     force: Spatial,
 }
@@ -216,12 +230,14 @@ impl Arms {
     #[inline(always)]
     fn joints(&self, quad: &mut Quad, rung: usize) -> Joints {
         let implicit = quad.implicit.rung(rung);
-        let inverse = f64x2::ONE / (self.inertia[0] + implicit);
+        let pivot = self.inertia[0] + implicit;
+        let inverse = f64x2::ONE / pivot;
         let own = (quad.torque.rung(rung) + self.force[0]) * inverse;
         quad.carried[0].set_rung(rung, implicit * inverse);
         quad.carried[1].set_rung(rung, self.inertia[1] * inverse);
         quad.carried[2].set_rung(rung, self.inertia[2] * inverse);
         quad.own.set_rung(rung, own);
+        quad.pivot.set_rung(rung, pivot);
         Joints { inverse, implicit, own }
     }
 
@@ -243,6 +259,13 @@ fn root_ends(root: &Quad) -> [f64x2; 2] {
 }
 
 impl Articulated {
+    /// way · inertia · way.
+    #[inline(always)]
+    pub(super) fn metric(&self, [turn, x, z]: Spatial) -> f64 {
+        let [i00, i01, i02, i11, i12, i22] = self.inertia;
+        turn * (i00 * turn + 2.0 * (i01 * x + i02 * z)) + x * (i11 * x + 2.0 * i12 * z) + z * i22 * z
+    }
+
     /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned;
     /// without fractions, so that no division waits for another.
     #[inline(always)]
@@ -271,38 +294,74 @@ pub(super) enum Hold {
     Hinged,
 }
 
-/// Mean motions u of the whole chain of so many `rungs`: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor`
-/// as their states say.
+/// Rungs of a block, of which a part of a long chain is made; an even number.
+pub(super) const BLOCK: usize = 8;
+
+/// What is felt at the outer end of a block of all that is further out; the default is nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Outside {
+    arms: Arms,
+    through: Joints,
+}
+
+/// Mean motions u of the chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as their states say.
+///
+/// Of the `rungs` of some blocks only: bodies further in move as they did, and those further out are felt as they last were. What is
+/// felt goes to `outside`, by block, unless it is empty. Returns the chain as it is felt at the root, if that is among `rungs`.
 #[inline(always)]
-pub(super) fn solve(quads: &mut [Quad], rungs: usize, hold: Hold, mut floor: Inwards, law: &Law) {
-    let (mut chain, mut through) = (Arms::default(), Joints::default());
-    for k in (1..rungs).rev() {
-        let (quad, rung) = (&mut quads[k / 2], k % 2);
-        chain.take(&through, pair(&quad.across, rung), quad, rung);
-        if let Some(by) = floor.take(k, law) {
-            chain.touch(&by);
+pub(super) fn solve(
+    quads: &mut [Quad],
+    rungs: Range<usize>,
+    hold: Hold,
+    mut floor: Inwards,
+    law: &Law,
+    outside: &mut [Outside],
+) -> Articulated {
+    let block_of = |end: usize| (end - 1) / BLOCK;
+    let mut end = rungs.end;
+    let Outside { arms: mut chain, mut through } = outside.get(block_of(end)).copied().unwrap_or_default();
+    while end > rungs.start {
+        let mut start = rungs.start;
+        if let Some(outside) = outside.get_mut(block_of(end)) {
+            *outside = Outside { arms: chain, through };
+            start = BLOCK * block_of(end);
         }
-        through = chain.joints(quad, rung);
+        for k in (start.max(1)..end).rev() {
+            let (quad, rung) = (&mut quads[k / 2], k % 2);
+            chain.take(&through, pair(&quad.across, rung), quad, rung);
+            if let Some(by) = floor.take(k, law) {
+                chain.touch(&by);
+            }
+            through = chain.joints(quad, rung);
+        }
+        end = start;
     }
-    let root = &mut quads[0];
-    let motion = if hold == Hold::Clamped {
-        [0.0; 3]
-    } else if hold == Hold::Hinged {
-        let whole = chain.at_root(&through, root);
-        [(whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0)), 0.0, 0.0]
-    } else {
-        let mut whole = chain.at_root(&through, root);
-        if let Some(by) = floor.take(0, law) {
-            (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
-            (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
-        }
-        whole.motion()
-    };
-    let [mut turn, mut x, mut z] = motion.map(f64x2::splat);
+    let mut whole = Articulated::default();
     let set = |quad: &mut Quad, rung: usize, mean: Spatials| (0..3).for_each(|k| quad.mean[k].set_rung(rung, mean[k]));
-    set(root, 0, [turn, x, z]);
-    let mut across = root_ends(root);
-    for k in 1..rungs {
+    let ([mut turn, mut x, mut z], mut across);
+    if let Some(inner) = rungs.start.checked_sub(1) {
+        let quad = &quads[inner / 2];
+        ([turn, x, z], across) = (pair(&quad.mean, inner % 2), pair(&quad.across, inner % 2));
+    } else {
+        let root = &mut quads[0];
+        let motion = if hold == Hold::Clamped {
+            [0.0; 3]
+        } else if hold == Hold::Hinged {
+            whole = chain.at_root(&through, root);
+            [(whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0)), 0.0, 0.0]
+        } else {
+            whole = chain.at_root(&through, root);
+            if let Some(by) = floor.take(0, law) {
+                (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
+                (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
+            }
+            whole.motion()
+        };
+        [turn, x, z] = motion.map(f64x2::splat);
+        set(root, 0, [turn, x, z]);
+        across = root_ends(root);
+    }
+    for k in rungs.start.max(1)..rungs.end {
         let (quad, rung) = (&mut quads[k / 2], k % 2);
         let [a, b, c] = pair(&quad.carried, rung);
         let carried = fma(b, across[1], fma(-c, across[0], a));
@@ -312,10 +371,11 @@ pub(super) fn solve(quads: &mut [Quad], rungs: usize, hold: Hold, mut floor: Inw
         set(quad, rung, [turn, x, z]);
         across = pair(&quad.across, rung);
     }
-    if rungs % 2 == 1 {
+    if rungs.end % 2 == 1 {
         // Bodies without mass outside of the last follow it.
-        set(&mut quads[rungs / 2], 1, [turn, x, z]);
+        set(&mut quads[rungs.end / 2], 1, [turn, x, z]);
     }
+    whole
 }
 
 #[cfg(test)]
