@@ -249,7 +249,7 @@ fn quads_of(rungs: &Range<usize>) -> Range<usize> {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::dispatch;
+    use fearless_simd::{Level, dispatch};
 
     use super::*;
     use crate::drive::Means;
@@ -271,18 +271,21 @@ mod tests {
         (experiment, engine)
     }
 
-    /// The same after a step in which it landed and corners changed.
+    fn step(experiment: &Experiment, engine: &mut PlanarEngine) {
+        let time = engine.step as f64 * 1e-4;
+        let mut voltages = [0.0; 30];
+        Means::new(&experiment.drive, 30, time).over(time, time + 1e-4, &mut voltages);
+        engine.prepare(&voltages).unwrap();
+        engine.advance().unwrap();
+    }
+
+    /// The robot after a step in which it landed and corners changed.
     fn landing() -> PlanarEngine {
         let (experiment, mut engine) = long();
-        let mut voltages = vec![0.0; 30];
-        let mut means = Means::new(&experiment.drive, 30, 0.0);
-        for step in 0..900 {
-            let time = f64::from(step) * 1e-4;
-            means.over(time, time + 1e-4, &mut voltages);
-            engine.prepare(&voltages).unwrap();
+        for _ in 0..900 {
             let before = engine.iterations();
-            engine.advance().unwrap();
-            if step > 500 && engine.iterations() > before + 5 {
+            step(&experiment, &mut engine);
+            if engine.step > 500 && engine.iterations() > before + 5 {
                 return engine;
             }
         }
@@ -352,23 +355,30 @@ mod tests {
         let (experiment, mut engine) = long();
         let (_, mut whole) = long();
         whole.outside.clear();
-        let mut voltages = vec![0.0; 30];
-        let mut means = Means::new(&experiment.drive, 30, 0.0);
         let mut worst = 0.0_f64;
-        for step in 0..900 {
-            whole.load(engine.step(), &engine.save().unwrap()).unwrap();
-            let time = f64::from(step) * 1e-4;
-            means.over(time, time + 1e-4, &mut voltages);
-            for engine in [&mut engine, &mut whole] {
-                engine.prepare(&voltages).unwrap();
-                engine.advance().unwrap();
-            }
+        for _ in 0..900 {
+            whole.load(engine.step, &engine.save().unwrap()).unwrap();
+            step(&experiment, &mut engine);
+            step(&experiment, &mut whole);
             let velocities = |engine: &PlanarEngine| engine.quads.iter().map(|quad| quad.motion).collect::<Vec<_>>();
             worst = worst.max(apart(&velocities(&engine), &velocities(&whole), 0..engine.quads.len()));
         }
         // Both end where no more than a velocity of 10⁻⁶ of g h is left to gain for the whole robot, 10⁻⁵ of it if one body in a hundred has it
         // all: 10⁻⁶ cm/s. Seen: none at all, for they end in the same states.
         assert!(worst < 1e-6, "{worst}");
-        assert!(engine.iterations() > whole.iterations(), "there were parts");
+        // Seen: 1442 steps, most of them of parts, and 1225 of the whole chain. Parts that mislead end in as many of the whole chain besides.
+        let (parts, alone) = (engine.iterations(), whole.iterations());
+        assert!(alone < parts && parts < alone * 5 / 4, "{parts} {alone}");
+    }
+
+    #[test]
+    fn parts_have_the_same_bits_in_all_registers() {
+        let after = |level: Level| {
+            let (experiment, mut engine) = long();
+            engine.level = level;
+            (0..900).for_each(|_| step(&experiment, &mut engine));
+            engine.save().unwrap().into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        };
+        assert_eq!(after(Level::new()), after(Level::baseline()));
     }
 }
