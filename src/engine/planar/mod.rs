@@ -54,7 +54,7 @@ use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
-use self::newton::LONGEST_WHOLE;
+use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -113,9 +113,11 @@ pub struct PlanarEngine {
     friction: FrictionModel,
     /// Mean motions of the reference points in the iterate of the contact problem.
     iterate: Vec<[Lanes; 3]>,
-    /// Of each block of rungs, if there are enough for solving in parts: one for the whole chain otherwise.
+    /// Newton steps after which a contact problem is given up.
+    largest_steps: u32,
+    /// Of each block of rungs, in chains long enough for solving in parts; empty otherwise.
     outside: Vec<Outside>,
-    /// Blocks with corners that a solution asks for other states.
+    /// Blocks with corners of which a solution asks other states.
     asking: Vec<bool>,
     law: Law,
     weight: f64,
@@ -234,6 +236,7 @@ impl PlanarEngine {
             },
             friction: FrictionModel::default(),
             iterate: vec![[Lanes::ZERO; 3]; quads.len()],
+            largest_steps: LARGEST_STEPS + MORE_PER_BODY * count as u32,
             outside: vec![Outside::default(); blocks],
             asking: vec![false; blocks],
             quads,

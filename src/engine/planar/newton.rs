@@ -12,8 +12,8 @@ use crate::model::Mount;
 
 /// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured: 33 in a second of the paper's
 /// robots each; 94 when a chain of 961 bodies is set in motion at once, and those that went before in parts.
-const LARGEST_ITERATIONS: u32 = 100;
-const MORE_PER_BODY: u32 = 4;
+pub(super) const LARGEST_STEPS: u32 = 100;
+pub(super) const MORE_PER_BODY: u32 = 4;
 /// Newton steps that are taken whole before the way is searched for the lowest cost. Measured: within 1 % as many steps in all as with one.
 const WHOLE: u32 = 3;
 /// The search ends where the slope of the cost is this share of the one it began with.
@@ -85,7 +85,7 @@ impl PlanarEngine {
             }
             steps = in_parts;
         }
-        let largest = LARGEST_ITERATIONS + MORE_PER_BODY * self.count as u32;
+        let largest = self.largest_steps;
         let (whole, done) = self.newton_steps(simd, 0..self.rungs, self.floor.all(), largest, law);
         if done {
             return Ok(steps + whole);
@@ -271,12 +271,16 @@ mod tests {
         (experiment, engine)
     }
 
-    fn step(experiment: &Experiment, engine: &mut PlanarEngine) {
+    fn try_step(experiment: &Experiment, engine: &mut PlanarEngine) -> Result<(), EngineError> {
         let time = engine.step as f64 * 1e-4;
         let mut voltages = [0.0; 30];
         Means::new(&experiment.drive, 30, time).over(time, time + 1e-4, &mut voltages);
-        engine.prepare(&voltages).unwrap();
-        engine.advance().unwrap();
+        engine.prepare(&voltages)?;
+        engine.advance()
+    }
+
+    fn step(experiment: &Experiment, engine: &mut PlanarEngine) {
+        try_step(experiment, engine).unwrap();
     }
 
     /// The robot after a step in which it landed and corners changed.
@@ -369,6 +373,17 @@ mod tests {
         // Seen: 1442 steps, most of them of parts, and 1225 of the whole chain. Parts that mislead end in as many of the whole chain besides.
         let (parts, alone) = (engine.iterations(), whole.iterations());
         assert!(alone < parts && parts < alone * 5 / 4, "{parts} {alone}");
+    }
+
+    /// Landing takes more than two steps of Newton's method.
+    #[test]
+    fn too_many_steps_are_a_failure_with_step_and_time() {
+        let (experiment, mut engine) = long();
+        engine.outside.clear();
+        engine.largest_steps = 2;
+        let error = (0..900).find_map(|_| try_step(&experiment, &mut engine).err()).expect("no failure").to_string();
+        let (step, time) = (engine.step, engine.step as f64 * 1e-4);
+        assert!(error.contains(&format!("step {step}")) && error.contains(&time.to_string()), "{error}: {step} {time}");
     }
 
     #[test]

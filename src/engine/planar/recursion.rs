@@ -304,6 +304,24 @@ pub(super) struct Outside {
     through: Joints,
 }
 
+/// The chain as it is felt at the root, which is all of it, and the root's motion.
+#[inline(always)]
+fn root_motion(chain: Arms, through: &Joints, root: &Quad, hold: Hold, mut floor: Inwards, law: &Law) -> (Articulated, Spatial) {
+    if hold == Hold::Clamped {
+        return Default::default();
+    }
+    let mut whole = chain.at_root(through, root);
+    if hold == Hold::Hinged {
+        let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
+        return (whole, [turn, 0.0, 0.0]);
+    }
+    if let Some(by) = floor.take(0, law) {
+        (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
+        (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
+    }
+    (whole, whole.motion())
+}
+
 /// Mean motions u of the chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as their states say.
 ///
 /// Of the `rungs` of some blocks only: bodies further in move as they did, and those further out are felt as they last were. What is
@@ -344,19 +362,8 @@ pub(super) fn solve(
         ([turn, x, z], across) = (pair(&quad.mean, inner % 2), pair(&quad.across, inner % 2));
     } else {
         let root = &mut quads[0];
-        let motion = if hold == Hold::Clamped {
-            [0.0; 3]
-        } else if hold == Hold::Hinged {
-            whole = chain.at_root(&through, root);
-            [(whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0)), 0.0, 0.0]
-        } else {
-            whole = chain.at_root(&through, root);
-            if let Some(by) = floor.take(0, law) {
-                (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
-                (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
-            }
-            whole.motion()
-        };
+        let motion;
+        (whole, motion) = root_motion(chain, &through, root, hold, floor, law);
         [turn, x, z] = motion.map(f64x2::splat);
         set(root, 0, [turn, x, z]);
         across = root_ends(root);
