@@ -115,7 +115,7 @@ pub struct PlanarEngine {
     iterate: Vec<[Lanes; 3]>,
     /// Newton steps after which a contact problem is given up.
     largest_steps: u32,
-    /// Of each block of rungs, in chains long enough for solving in parts; empty otherwise.
+    /// Of each block of rungs, in chains on the ground that are long enough for solving in parts; empty otherwise.
     outside: Vec<Outside>,
     /// Blocks with corners of which a solution asks other states.
     asking: Vec<bool>,
@@ -169,7 +169,7 @@ impl PlanarEngine {
         let clamped = robot.mount == Mount::Clamped;
         let root = if clamped { 0 } else { count / 2 };
         let rungs = root.max(count - 1 - root) + 1;
-        let blocks = if rungs > LONGEST_WHOLE { rungs.div_ceil(BLOCK) } else { 0 };
+        let blocks = if robot.mount == Mount::Ground && rungs > LONGEST_WHOLE { rungs.div_ceil(BLOCK) } else { 0 };
         let mut quads = vec![Quad::empty(); rungs.div_ceil(2)];
         let mut frictions = vec![[0.0; 2]; rungs];
         for (i, segment) in segments.iter().enumerate() {
