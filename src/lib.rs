@@ -71,11 +71,13 @@ pub mod engine;
 pub mod experiment;
 pub mod export;
 mod files;
+pub mod keys;
 pub mod model;
 pub mod recording;
 pub mod reproduce;
 pub mod sweep;
 pub mod view;
+mod words;
 
 /// Compiles and runs the examples of the README.
 #[cfg(doctest)]

@@ -254,7 +254,11 @@ fn crosscheck_agrees_with_a_recording_and_finds_where_another_damping_departs() 
     assert_eq!(bad.status.code(), Some(1));
     let line = out(&bad).lines().find(|line| line.contains("joint angles")).unwrap().to_owned();
     // The recording is flat at step 0; the damping acts from the first record after it, at step 499.
-    assert!(line.contains("first at step 499, joint 1") && line.contains("ulp") && line.contains("TOO FAR"), "{line}");
+    assert!(
+        line.contains("first at step 499, joint 1") && line.contains(" rad, ") && line.contains("allowed: equal bits"),
+        "{line}"
+    );
+    assert!(line.contains("TOO FAR") && !out(&bad).contains("last place"), "{}", out(&bad));
 
     let json = bench.sfers(&[&arguments[..], &["--set", "simulation.steps=20000", "--json"]].concat());
     let report: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();

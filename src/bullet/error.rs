@@ -30,7 +30,7 @@ pub enum BulletError {
         needed: usize,
     },
     /// A value that Bullet cannot take: not finite, or outside its range.
-    #[error("{what} is {value}, but must be {needed}")]
+    #[error("{what} is {}, but must be {needed}", crate::words::number(*.value))]
     Value {
         /// The argument.
         what: &'static str,

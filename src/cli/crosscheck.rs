@@ -201,21 +201,32 @@ fn describe(outcome: &Outcome) -> String {
         text += &format!("  {mismatch}\n");
     }
     for Quantity { name, unit, values, tolerance, difference, passes } in &report.quantities {
-        let finding = match difference {
-            None => "equal bits".to_owned(),
-            Some(d) => format!(
-                "{} differ, at most by {:.1e} {unit} ({} ulp), first at step {}, {}{}",
-                d.values,
-                d.largest,
-                d.largest_ulp,
-                d.first_step,
-                place(name, d.first_place),
-                if *passes { format!("; allowed {tolerance:.0e}") } else { "  <-- TOO FAR".into() }
-            ),
-        };
+        let finding = difference.as_ref().map_or_else(
+            || "equal bits".to_owned(),
+            |d| {
+                let size = if d.largest.is_nan() {
+                    "one side is not a number".to_owned()
+                } else {
+                    format!("at most by {:.1e} {unit}{}", d.largest, last_place(d.largest_ulp))
+                };
+                let allowed = if *tolerance == 0.0 { "equal bits".into() } else { format!("{tolerance:.0e} {unit}") };
+                let mark = if *passes { "" } else { "  <-- TOO FAR" };
+                let place = place(name, d.first_place);
+                format!("{} differ, {size}, first at step {}, {place}; allowed: {allowed}{mark}", d.values, d.first_step)
+            },
+        );
         text += &format!("  {name:16} {values:>8} values  {finding}\n");
     }
     text
+}
+
+/// A difference in units in the last place, where there are so few that the count tells more than the size.
+fn last_place(ulp: Option<u64>) -> String {
+    match ulp {
+        Some(1) => " (1 unit in the last place)".into(),
+        Some(count @ 2..1_000_000) => format!(" ({count} units in the last place)"),
+        _ => String::new(),
+    }
 }
 
 fn place(quantity: &str, index: usize) -> String {

@@ -5,6 +5,8 @@ mod crosscheck;
 mod diagnose;
 mod effects;
 mod export;
+mod help;
+mod man;
 mod output;
 mod plot;
 mod presets;
@@ -69,6 +71,8 @@ enum Command {
         /// Its name, from `sfers presets`.
         name: String,
     },
+    Help(help::Args),
+    Man(man::Args),
     /// Print a completion script for a shell.
     ///
     /// Example: sfers completions bash > /etc/bash_completion.d/sfers
@@ -195,6 +199,8 @@ pub fn main() -> ExitCode {
         Command::Effects => effects::run(options),
         Command::Presets => presets::list(options),
         Command::Preset { name } => presets::show(&name),
+        Command::Help(args) => help::run(&args, options),
+        Command::Man(args) => man::run(&args, options),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "sfers", &mut script);

@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use serde_json::json;
 
 use super::{Failure, Options, print};
-use crate::experiment::presets::{CLASSES, DATASETS, PRESETS, Preset, SWEEPS, find, find_class, find_dataset, find_sweep};
+use crate::experiment::presets::{
+    CLASSES, DATASETS, PRESETS, Preset, SWEEPS, find, find_class, find_dataset, find_sweep, unknown,
+};
 
 pub fn list(options: Options) -> Result<ExitCode, Failure> {
     if options.json {
@@ -34,8 +36,8 @@ pub fn show(name: &str) -> Result<ExitCode, Failure> {
     let text = match find_class(name) {
         Some(class) => class.text(),
         None => {
-            let unknown = || Failure::Usage(format!("there is no preset {name:?}; sfers presets lists them"));
-            find(name).or_else(|| find_sweep(name)).or_else(|| find_dataset(name)).ok_or_else(unknown)?.text.to_owned()
+            let refuse = || Failure::Usage(unknown(name));
+            find(name).or_else(|| find_sweep(name)).or_else(|| find_dataset(name)).ok_or_else(refuse)?.text.to_owned()
         }
     };
     print(&text)?;

@@ -10,6 +10,7 @@ use serde_json::json;
 use super::output::{finish, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print};
 use crate::reproduce::{Bench, Effort, Findings, STUDIES, Study, StudyError, page, table};
+use crate::words;
 
 /// The paper's results beside this program's: DIR/index.html, a figure and a table each.
 ///
@@ -43,7 +44,7 @@ fn choose(ids: &[String]) -> Result<Vec<Study>, Failure> {
     let find = |id: &String| STUDIES.iter().find(|study| study.id == id).copied();
     let unknown = |id: &String| {
         let known: Vec<_> = STUDIES.iter().map(|study| study.id).collect();
-        Failure::Usage(format!("there is no result {id:?}; choose from {}", known.join(", ")))
+        Failure::Usage(words::not_one_of(id, &known))
     };
     ids.iter().map(|id| find(id).ok_or_else(|| unknown(id))).collect()
 }

@@ -5,13 +5,17 @@ use serde::Serialize;
 use super::{POSITION_TOLERANCE, VELOCITY_TOLERANCE};
 use crate::recording::Recording;
 
+/// From which share of a quantity's largest value on differences are counted in units in the last place.
+pub const FAR: f64 = 1e-3;
+
 /// Where two recordings of one quantity differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
     /// How many values have other bits.
     pub values: usize,
-    /// The largest difference in units in the last place.
-    pub largest_ulp: u64,
+    /// The largest difference in units in the last place, of pairs that are both further from zero than [`FAR`] of the quantity's largest
+    /// value: nearer to zero the unit shrinks and the count says nothing. `None` if no such pair differs.
+    pub largest_ulp: Option<u64>,
     /// The largest difference in the quantity's unit; NaN if one side is not a number.
     pub largest: f64,
     /// Step of the first difference, counting from 0.
@@ -102,14 +106,17 @@ fn mismatch(ours: &Recording, theirs: &Recording) -> Vec<String> {
 /// do so too, and PyBullet's reports do not keep the sign of a zero.
 fn difference(a: &[f64], b: &[f64]) -> Option<(Difference, usize)> {
     let mut found: Option<(Difference, usize)> = None;
+    let far = FAR * a.iter().chain(b).fold(0.0_f64, |most, value| most.max(value.abs()));
     for (index, (&a, &b)) in a.iter().zip(b).enumerate() {
         if a.to_bits() == b.to_bits() || a == b {
             continue;
         }
-        let (difference, _) =
-            found.get_or_insert((Difference { values: 0, largest_ulp: 0, largest: 0.0, first_step: 0, first_place: 0 }, index));
+        let (difference, _) = found
+            .get_or_insert((Difference { values: 0, largest_ulp: None, largest: 0.0, first_step: 0, first_place: 0 }, index));
         difference.values += 1;
-        difference.largest_ulp = difference.largest_ulp.max(ulps(a, b));
+        if a.abs() >= far && b.abs() >= far {
+            difference.largest_ulp = difference.largest_ulp.max(Some(ulps(a, b)));
+        }
         let size = (a - b).abs();
         // max() would drop a NaN.
         if size.is_nan() || difference.largest.is_nan() {
@@ -121,11 +128,8 @@ fn difference(a: &[f64], b: &[f64]) -> Option<(Difference, usize)> {
     found
 }
 
-/// Number of representable numbers from `a` to `b`; the largest integer if one is not a number.
+/// Number of representable numbers from `a` to `b`.
 fn ulps(a: f64, b: f64) -> u64 {
-    if a.is_nan() || b.is_nan() {
-        return u64::MAX;
-    }
     // Maps floats to integers in the same order.
     let order = |x: f64| {
         let bits = x.to_bits().cast_signed();
@@ -156,7 +160,6 @@ mod tests {
     fn ulps_count_representable_numbers_across_zero() {
         assert_eq!(ulps(1.0, 1.0 + f64::EPSILON), 1);
         assert_eq!(ulps(-f64::from_bits(1), f64::from_bits(2)), 3);
-        assert_eq!(ulps(f64::NAN, 1.0), u64::MAX);
     }
 
     #[test]
@@ -167,7 +170,20 @@ mod tests {
         let report = compare(&recording(), &other);
         assert!(!report.passes);
         let d = report.quantities.iter().find(|q| q.name == "joint angles").unwrap().difference.clone().unwrap();
-        assert_eq!((d.values, d.largest_ulp, d.first_step, d.first_place), (1, 1, 3, 2));
+        assert_eq!((d.values, d.largest_ulp, d.first_step, d.first_place), (1, Some(1), 3, 2));
+    }
+
+    #[test]
+    fn near_zero_no_units_in_the_last_place_are_counted() {
+        let mut other = recording();
+        // A hair beside zero is 4 billion billion units away, and says nothing; the largest angle is 0.6.
+        other.angles[0] = 1e-12;
+        let angles = |other: &Recording| compare(&recording(), other).quantities[1].difference.clone().unwrap();
+        assert_eq!((angles(&other).values, angles(&other).largest_ulp), (1, None));
+        other.angles[4] += f64::EPSILON;
+        assert_eq!((angles(&other).values, angles(&other).largest_ulp), (2, Some(2)));
+        other.angles[4] = f64::NAN;
+        assert!(angles(&other).largest.is_nan() && angles(&other).largest_ulp.is_none());
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod engines;
 mod python;
 
 pub use builtin::{BUILTIN, Builtin};
-pub use compare::{Difference, Quantity, Report, compare};
+pub use compare::{Difference, FAR, Quantity, Report, compare};
 pub use engines::{ENGINE_SET, EngineReport, MeasurePair, PARTED, Parting, compare_engines};
 pub use python::{AuthorsRun, CrosscheckError, Versions, authors_run, run_authors, run_pybullet};
 

@@ -10,6 +10,8 @@ use crate::experiment::{
     Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment, presets,
 };
 use crate::model::Robot;
+use crate::recording::definitions;
+use crate::words;
 
 /// Data that cannot be used as they are.
 #[derive(Debug, Error)]
@@ -43,7 +45,7 @@ pub enum DataError {
 /// A data set's description, as written.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Description {
+pub(crate) struct Description {
     dataset: About,
     material: MaterialConfig,
     robot: RobotConfig,
@@ -55,14 +57,14 @@ struct Description {
 
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct About {
+pub(crate) struct About {
     name: String,
     about: String,
 }
 
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RunEntry {
+pub(crate) struct RunEntry {
     id: String,
     file: PathBuf,
     #[serde(default)]
@@ -177,7 +179,7 @@ impl Dataset {
         };
         let description: Description = toml::from_str(&text).map_err(|error| ConfigError::Syntax {
             source_name: path.display().to_string(),
-            message: error.to_string().trim_end().into(),
+            message: words::toml_error(&error),
         })?;
         let line_of =
             |words: &str| text.lines().position(|line| line.trim_start().starts_with(words)).map_or(1, |at| at as u64 + 1);
@@ -209,7 +211,11 @@ impl Dataset {
             if !(0.0..=10.0 * length + 1e-9).contains(position) {
                 return Err(wrong(
                     name,
-                    format!("marker {name} is at {position} mm, but the robot is {} mm long", 10.0 * length),
+                    format!(
+                        "marker {name} is at {} mm, but the robot is {} mm long",
+                        words::number(*position),
+                        words::number(10.0 * length)
+                    ),
                 ));
             }
             markers.push(Marker { name: name.clone(), position: 0.1 * position });
@@ -219,10 +225,12 @@ impl Dataset {
         for (key, value) in &description.noise {
             let known = key == "default_mm" || markers.iter().any(|marker| *key == format!("{}_mm", marker.name));
             if !known {
-                return Err(wrong(key, format!("{key} is neither default_mm nor the name of a marker with _mm")));
+                let known: Vec<_> = markers.iter().map(|marker| format!("{}_mm", marker.name)).collect();
+                let hint = words::did_you_mean(key, known.iter().map(String::as_str).chain(["default_mm"]));
+                return Err(wrong(key, format!("{key} is neither default_mm nor the name of a marker with _mm{hint}")));
             }
             if !(value.is_finite() && *value > 0.0) {
-                return Err(wrong(key, format!("{key} is {value}, but must be positive")));
+                return Err(wrong(key, format!("{key} is {}, but must be positive", words::number(*value))));
             }
         }
         for marker in &markers {
@@ -239,6 +247,10 @@ impl Dataset {
             runs.push(MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks });
         }
         for observation in &description.observation {
+            if !definitions::names().contains(&observation.measure.as_str()) {
+                let reason = words::not_one_of(&observation.measure, &definitions::names());
+                return Err(wrong(&format!("measure = \"{}\"", observation.measure), format!("measure: {reason}")));
+            }
             if !(observation.sigma.is_finite() && observation.sigma > 0.0 && observation.value.is_finite()) {
                 return Err(wrong(
                     "[[observation]]",

@@ -24,6 +24,7 @@ use thiserror::Error;
 
 use crate::drive::Drive;
 use crate::model::Robot;
+use crate::words::{did_you_mean, number};
 
 /// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -168,10 +169,10 @@ pub fn find(id: &str) -> Option<&'static Effect> {
 #[non_exhaustive]
 pub enum EffectError {
     /// No such effect.
-    #[error("there is no effect {0:?}; `sfers effects` lists them")]
+    #[error("there is no effect {0:?}{hint}; `sfers effects` lists them", hint = did_you_mean(.0, EFFECTS.iter().map(|effect| effect.id)))]
     Unknown(String),
     /// A key that is no parameter of it.
-    #[error("effect {id} has no parameter {name:?}; it takes {known}")]
+    #[error("effect {id} has no parameter {name:?}; it takes {known}{hint}", hint = did_you_mean(.name, .known.split(", ")))]
     UnknownParameter {
         /// The effect.
         id: &'static str,
@@ -189,7 +190,7 @@ pub enum EffectError {
         name: &'static str,
     },
     /// A value out of range.
-    #[error("effect {id}: {name} is {value}, but must lie between {low} and {high}")]
+    #[error("effect {id}: {name} is {}, but must lie between {} and {}", number(*.value), number(*.low), number(*.high))]
     Range {
         /// The effect.
         id: &'static str,
@@ -276,18 +277,18 @@ impl Applied {
         if let Some(actuator) = self.get("actuator")
             && (actuator.fract() != 0.0 || actuator > robot.actuators as f64)
         {
-            return wrong(format!("actuator is {actuator}, but the robot has {} actuators", robot.actuators));
+            return wrong(format!("actuator is {}, but the robot has {} actuators", number(actuator), robot.actuators));
         }
         if let Some(position) = self.get("position_mm")
             && position.is_finite()
             && position > 10.0 * robot.material.actuator_length * robot.actuators as f64
         {
-            return wrong(format!("position_mm is {position}, beyond the robot's end"));
+            return wrong(format!("position_mm is {}, beyond the robot's end", number(position)));
         }
         if let Some(m) = self.get("motors_per_actuator")
             && m.fract() != 0.0
         {
-            return wrong(format!("motors_per_actuator is {m}, but must be a whole number"));
+            return wrong(format!("motors_per_actuator is {}, but must be a whole number", number(m)));
         }
         Ok(())
     }

@@ -7,10 +7,12 @@ use super::resolve::Trouble;
 use super::{Control, Experiment, run};
 use crate::model::Robot;
 use crate::recording::Recording;
+use crate::recording::definitions;
 use crate::recording::measures::Measures;
+use crate::words::{not_one_of, number};
 
 /// Share of the result that half the step may change, where a file does not say.
-const DEFAULT_ERROR: f64 = 1e-3;
+pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
 /// Where the search begins (s), and the finest step that it tries.
 const COARSEST: f64 = 1e-3;
 const FINEST: f64 = 1e-7;
@@ -45,15 +47,14 @@ pub(super) fn choose(
     resolve: impl Fn(&Config) -> Result<Experiment, Trouble>,
 ) -> Result<Experiment, Trouble> {
     let s = &config.simulation;
-    let asked = s.step_error.unwrap_or(DEFAULT_ERROR);
+    let asked = s.step_error.unwrap_or(DEFAULT_STEP_ERROR);
     if !(asked > 0.0 && asked < 1.0) {
-        return Err(Fault::new("simulation.step_error", format!("is {asked}, but must lie between 0 and 1")).into());
+        return Err(Fault::new("simulation.step_error", format!("is {}, but must lie between 0 and 1", number(asked))).into());
     }
     if let Some(name) = &s.step_measure
-        && !Measures::names().contains(name)
+        && !definitions::names().contains(&name.as_str())
     {
-        let names = Measures::names().join(", ");
-        return Err(Fault::new("simulation.step_measure", format!("there is no {name}; choose from {names}")).into());
+        return Err(Fault::new("simulation.step_measure", not_one_of(name, &definitions::names())).into());
     }
     let Some(duration) = s.duration_s else {
         return Err(Fault::new("simulation.duration_s", "is missing; time_step_s = \"auto\" does not go with steps").into());

@@ -8,6 +8,8 @@ use thiserror::Error;
 use toml::Table;
 use toml::de::{DeTable, DeValue};
 
+use crate::words;
+
 /// An experiment that cannot be run as it is written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -253,11 +255,12 @@ impl Source {
     pub fn parse(&self) -> Result<Config, ConfigError> {
         let syntax =
             |source_name: String, message: String| ConfigError::Syntax { source_name, message: message.trim_end().into() };
-        let config: Config = toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
+        let config: Config = toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), words::toml_error(&error)))?;
         if self.settings.is_empty() {
             return Ok(config);
         }
-        let mut table: Table = toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), error.to_string()))?;
+        let mut table: Table =
+            toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), words::toml_error(&error)))?;
         for (key, value) in &self.settings {
             let name = || format!("--set {key}={value}");
             // `v = VALUE` is TOML if VALUE is; a bare word is taken as a string.
@@ -268,9 +271,9 @@ impl Source {
                 .unwrap_or_else(|| toml::Value::String(value.clone()));
             assign(&mut table, key, parsed).map_err(|message| syntax(name(), message))?;
             // Checked one by one, so that the message names the setting at fault.
-            table.clone().try_into::<Config>().map_err(|error| syntax(name(), error.to_string()))?;
+            table.clone().try_into::<Config>().map_err(|error| syntax(name(), words::toml_error(&error)))?;
         }
-        table.try_into().map_err(|error: toml::de::Error| syntax(self.name.clone(), error.to_string()))
+        table.try_into().map_err(|error: toml::de::Error| syntax(self.name.clone(), words::toml_error(&error)))
     }
 
     /// Says where a key's value came from.

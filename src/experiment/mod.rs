@@ -9,6 +9,8 @@ mod run;
 mod spec;
 mod state;
 
+#[cfg(test)]
+pub(crate) use auto::DEFAULT_STEP_ERROR;
 pub use auto::StepChoice;
 pub use config::{
     Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig,

@@ -2,6 +2,8 @@
 
 use toml::Table;
 
+use crate::words::did_you_mean;
+
 /// A built-in experiment or sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Preset {
@@ -155,6 +157,13 @@ pub fn find_sweep(name: &str) -> Option<&'static Preset> {
 /// Finds a class of the reference by its name.
 pub fn find_class(name: &str) -> Option<&'static Class> {
     CLASSES.iter().find(|class| class.name == name)
+}
+
+/// The message that there is no preset of that name.
+pub(crate) fn unknown(name: &str) -> String {
+    let lists = [PRESETS, SWEEPS, DATASETS];
+    let known = lists.into_iter().flatten().map(|preset| preset.name).chain(CLASSES.iter().map(|class| class.name));
+    format!("there is no preset {name:?}{}; `sfers presets` lists them", did_you_mean(name, known))
 }
 
 impl Class {

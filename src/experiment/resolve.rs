@@ -10,6 +10,7 @@ use crate::effects::{self, Applied, EffectError};
 use crate::engine::FrictionModel;
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
 use crate::model::{Damping, Extensions, Film, Friction, Material, ModelError, Mount, Robot};
+use crate::words::{not_one_of, number};
 
 /// The reference's `dampingEta` where a file gives no damping.
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
@@ -57,7 +58,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
     let mut robot = robot(config)?;
     let effects = effects(config)?;
     robot.check().map_err(|ModelError::Value { key, value, needed }| {
-        Fault::new(key, format!("is {value} in the program's CGS units, but must be {needed}"))
+        Fault::new(key, format!("is {}, but must be {needed}", number(value)))
     })?;
     let engines = [("bullet", EngineKind::Bullet), ("planar", EngineKind::Planar)];
     let engine = choose("simulation.engine", config.simulation.engine.as_deref(), EngineKind::Bullet, &engines)?;
@@ -126,7 +127,7 @@ fn choose<T: Copy>(key: &str, value: Option<&str>, default: T, choices: &[(&str,
     let Some(value) = value else { return Ok(default) };
     choices.iter().find(|(name, _)| *name == value).map(|&(_, choice)| choice).ok_or_else(|| {
         let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-        Fault::new(key, format!("{value:?} is not one of {}", names.join(", ")))
+        Fault::new(key, not_one_of(value, &names))
     })
 }
 
@@ -201,7 +202,7 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
         if value.is_finite() && value > 0.0 {
             Ok(value)
         } else {
-            Err(Fault::new(key, format!("is {value}, but must be positive")))
+            Err(Fault::new(key, format!("is {}, but must be positive", number(value))))
         }
     };
     let Some(StepConfig::Seconds(time_step)) = s.time_step_s else {
@@ -209,14 +210,17 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
     };
     let time_step = positive("simulation.time_step_s", time_step)? * scale;
     if time_step < 1e-12 {
-        return Err(Fault::new("simulation.time_step_s", format!("is {time_step} s; the least is 1e-12 s")));
+        return Err(Fault::new("simulation.time_step_s", format!("is {} s; the least is 1e-12 s", number(time_step))));
     }
     let in_steps = |key: &str, seconds: f64| {
         let steps = (positive(key, seconds)? / time_step).round();
         if (1.0..=1e15).contains(&steps) {
             Ok(steps as u64)
         } else {
-            Err(Fault::new(key, format!("is {steps} time steps of {time_step} s; between 1 and 1e15 are possible")))
+            Err(Fault::new(
+                key,
+                format!("is {} time steps of {} s; between 1 and 1e15 are possible", number(steps), number(time_step)),
+            ))
         }
     };
     let steps = match (s.steps, s.duration_s) {
@@ -286,11 +290,15 @@ fn needed<'a, T>(key: &str, value: Option<&'a T>) -> Result<&'a T, Fault> {
 }
 
 fn finite(key: &str, value: f64) -> Result<f64, Fault> {
-    if value.is_finite() { Ok(value) } else { Err(Fault::new(key, format!("is {value}, but must be a number"))) }
+    if value.is_finite() { Ok(value) } else { Err(Fault::new(key, format!("is {}, but must be a finite number", number(value)))) }
 }
 
 fn positive(key: &str, value: f64) -> Result<f64, Fault> {
-    if finite(key, value)? > 0.0 { Ok(value) } else { Err(Fault::new(key, format!("is {value}, but must be positive"))) }
+    if finite(key, value)? > 0.0 {
+        Ok(value)
+    } else {
+        Err(Fault::new(key, format!("is {}, but must be positive", number(value))))
+    }
 }
 
 /// Checks that there is one finite voltage per actuator.
@@ -347,8 +355,8 @@ fn waveform(d: &DriveConfig, robot: &Robot, first: f64, folder: &Path) -> Result
             Waveform::Table(drive_csv::read(&path, robot.actuators).map_err(Trouble::Config)?)
         }
         other => {
-            let message = format!("{other:?} is not one of gait, dc, sine, step, sequence, csv");
-            return Err(Fault::new("drive.waveform", message).into());
+            let waveforms = ["gait", "dc", "sine", "step", "sequence", "csv"];
+            return Err(Fault::new("drive.waveform", not_one_of(other, &waveforms)).into());
         }
     })
 }
@@ -357,7 +365,7 @@ fn gait_waveform(d: &DriveConfig, robot: &Robot) -> Result<Waveform, Fault> {
     let name = needed("drive.gait", d.gait.as_ref())?;
     let gait = gait::find(name).ok_or_else(|| {
         let names: Vec<_> = gait::GAITS.iter().map(|gait| gait.name).collect();
-        Fault::new("drive.gait", format!("{name:?} is not one of {}", names.join(", ")))
+        Fault::new("drive.gait", not_one_of(name, &names))
     })?;
     if robot.actuators != 5 {
         let message =
@@ -384,7 +392,7 @@ fn gait_waveform(d: &DriveConfig, robot: &Robot) -> Result<Waveform, Fault> {
         given.or(gait.default_parameter).ok_or_else(|| Fault::new(&key, format!("is missing; gait {name} needs it")))?;
     finite(&key, parameter)?;
     if parameter < 0.0 && gait.once_if_negative.is_empty() {
-        return Err(Fault::new(&key, format!("is {parameter}, but must not be negative for gait {name}")));
+        return Err(Fault::new(&key, format!("is {}, but must not be negative for gait {name}", number(parameter))));
     }
     let on_voltages = voltages("drive.on_voltages_v", d.on_voltages_v.as_deref().unwrap_or(&DEFAULT_ON_VOLTAGES), robot)?;
     Ok(Waveform::Gait { gait, parameter, on_voltages })
@@ -408,7 +416,7 @@ fn sequence(d: &DriveConfig, robot: &Robot) -> Result<Waveform, Fault> {
         let fault = |message: String| Fault::new("drive.phases", format!("phase {}: {message}", index + 1));
         let until = phase_end(phase, period, index + 1 == phases.len()).map_err(fault)?;
         if until.is_nan() || until <= last {
-            return Err(fault(format!("ends at {until} s, but must end after {last} s")));
+            return Err(fault(format!("ends at {} s, but must end after {} s", number(until), number(last))));
         }
         last = until;
         resolved.push((until, phase_voltages(phase, on_voltages.as_deref(), robot).map_err(fault)?));

@@ -24,16 +24,18 @@ pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Se
 
 use thiserror::Error;
 
+use crate::words::number;
+
 /// A robot that cannot be built.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
     /// A constant out of range.
-    #[error("{key} is {value} (in the program's CGS units), but must be {needed}")]
+    #[error("{key} is {}, but must be {needed}", number(*.value))]
     Value {
         /// Key of the experiment file.
         key: &'static str,
-        /// Its value, in CGS units.
+        /// Its value, in the key's unit.
         value: f64,
         /// The range that is accepted.
         needed: &'static str,
@@ -41,7 +43,8 @@ pub enum ModelError {
 }
 
 impl ModelError {
+    /// `value` is in CGS units.
     fn unless(holds: bool, key: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
-        if holds { Ok(()) } else { Err(Self::Value { key, value, needed }) }
+        if holds { Ok(()) } else { Err(Self::Value { key, value: units::in_unit_of(key, value), needed }) }
     }
 }

@@ -41,3 +41,16 @@ pub fn cm_per_v_from_pm_per_v(pm_per_v: f64) -> f64 {
 pub fn cm_s2_from_m_s2(m_s2: f64) -> f64 {
     m_s2 * 100.0
 }
+
+/// A CGS value in the unit that the end of a key's name gives, for messages: to 15 digits, since the way back rounds too.
+pub(crate) fn in_unit_of(key: &str, cgs: f64) -> f64 {
+    let per_unit = [
+        ("_pm_per_v", cm_per_v_from_pm_per_v(1.0)),
+        ("_m_s2", cm_s2_from_m_s2(1.0)),
+        ("_gpa", ba_from_gpa(1.0)),
+        ("_um", cm_from_um(1.0)),
+        ("_mm", cm_from_mm(1.0)),
+    ];
+    let factor = per_unit.iter().find(|(end, _)| key.ends_with(end)).map_or(1.0, |(_, factor)| *factor);
+    format!("{:.14e}", cgs / factor).parse().unwrap_or(cgs)
+}

@@ -1,6 +1,7 @@
 //! What a run leaves behind: a trajectory with the numbers needed to read it.
 
 pub mod csv;
+pub mod definitions;
 pub mod measures;
 pub mod npz;
 pub mod signal;

@@ -10,10 +10,13 @@ use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
 
 use ndarray::{ArrayD, ArrayView, IxDyn, arr0};
-use ndarray_npy::{NpzReader, NpzWriter, ReadableElement, WritableElement, WriteDataError, WriteNpzError};
+use ndarray_npy::{
+    NpzReader, NpzWriter, ReadNpyError, ReadNpzError, ReadableElement, WritableElement, WriteDataError, WriteNpzError,
+};
 use py_literal::Value;
 
 use super::{GroundMeta, Meta, Recording, RecordingError};
+use crate::words::number;
 
 /// Length of `MM_DD_YYYY_HH_MM`.
 const DATE_LENGTH: usize = 16;
@@ -119,7 +122,10 @@ struct Arrays<R: Read + Seek>(NpzReader<R>);
 
 impl<R: Read + Seek> Arrays<R> {
     fn array<T: ReadableElement>(&mut self, key: &str) -> Result<ArrayD<T>, String> {
-        self.0.by_name(&format!("{key}.npy")).or_else(|_| self.0.by_name(key)).map_err(|error| format!("key {key}: {error}"))
+        self.0
+            .by_name(&format!("{key}.npy"))
+            .or_else(|_| self.0.by_name(key))
+            .map_err(|error| format!("key {key}: {}", plain(&error)))
     }
 
     /// The values of a float array of the given shape.
@@ -152,13 +158,28 @@ impl<R: Read + Seek> Arrays<R> {
         if value.fract() == 0.0 && (least..=1e9).contains(&value) {
             Ok(value as u64)
         } else {
-            Err(format!("key {key}: {value} is not a count of {least} or more"))
+            Err(format!("key {key}: {} is not a whole number from {least} to 1e9", number(value)))
         }
     }
 }
 
+/// What the zip and npy readers say, in plain words.
+fn plain(error: &ReadNpzError) -> String {
+    let text = error.to_string();
+    match error {
+        ReadNpzError::Npy(ReadNpyError::WrongDescriptor(found)) => {
+            format!("holds numbers of type {found}, which is not the one needed")
+        }
+        ReadNpzError::Zip(_) if text.contains("EOCD") => "there is no zip directory at its end".into(),
+        ReadNpzError::Zip(_) if text.contains("file not found") => "is missing".into(),
+        ReadNpzError::Zip(_) => format!("its zip archive is damaged ({text})"),
+        ReadNpzError::Npy(_) => format!("its array is damaged ({text})"),
+    }
+}
+
 fn parse(bytes: &[u8]) -> Result<Recording, String> {
-    let reader = NpzReader::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ archive, or cut short: {error}"))?;
+    let reader =
+        NpzReader::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ file, or cut short: {}", plain(&error)))?;
     let mut arrays = Arrays(reader);
     let actuators = arrays.count("N", 1.0)?;
     let motors_per_actuator = arrays.count("m", 1.0)?;
@@ -261,6 +282,22 @@ mod tests {
         let bytes = archive.finish().unwrap().into_inner();
         let error = read(&bytes, Path::new("odd.npz")).unwrap_err().to_string();
         assert!(error.contains("odd.npz") && error.contains("dataTheta") && error.contains("[3, 5]"), "{error}");
+    }
+
+    #[test]
+    fn what_is_no_archive_or_lacks_a_key_is_said_in_plain_words() {
+        let said = |bytes: &[u8]| read(bytes, Path::new("a.npz")).unwrap_err().to_string();
+        let whole = bytes(&sample(3));
+        for text in [said(b"t_s,v1_v"), said(b""), said(&whole[..whole.len() / 2])] {
+            assert!(text.contains("not an NPZ file, or cut short: there is no zip directory"), "{text}");
+        }
+        let mut archive = NpzWriter::new(Cursor::new(Vec::new()));
+        archive.add_array("N", &arr0(1_i64)).unwrap();
+        assert!(said(archive.finish().unwrap().get_ref()).ends_with("key m: is missing"));
+        let mut archive = NpzWriter::new(Cursor::new(Vec::new()));
+        archive.add_array("N", &arr0(1e300)).unwrap();
+        let text = said(archive.finish().unwrap().get_ref());
+        assert!(text.ends_with("key N: 1e300 is not a whole number from 1 to 1e9"), "{text}");
     }
 
     proptest! {

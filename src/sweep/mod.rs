@@ -24,7 +24,8 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use crate::experiment::{self, ConfigError, Experiment, Source, presets};
-use crate::recording::measures::Measures;
+use crate::recording::definitions;
+use crate::words;
 
 /// Largest number of points of a grid.
 const MAX_POINTS: usize = 10_000_000;
@@ -52,7 +53,7 @@ pub struct Sweep {
 /// The file as written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+pub(crate) struct File {
     experiment: String,
     measures: Vec<String>,
     vary: Table,
@@ -61,7 +62,7 @@ struct File {
 /// `{ from, to, count }`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Range {
+pub(crate) struct Range {
     from: f64,
     to: f64,
     count: usize,
@@ -78,12 +79,11 @@ impl Sweep {
 
     fn with_settings(name: &str, text: &str, folder: &Path, settings: &[String]) -> Result<Self, ConfigError> {
         let file: File = toml::from_str(text)
-            .map_err(|error| ConfigError::Syntax { source_name: name.into(), message: error.to_string().trim_end().into() })?;
+            .map_err(|error| ConfigError::Syntax { source_name: name.into(), message: words::toml_error(&error) })?;
         let fault = |key: &str, message: String| ConfigError::Value { place: name.into(), key: key.into(), message };
         let mut source = match file.experiment.strip_prefix("preset:") {
             Some(preset) => {
-                let found = presets::find(preset)
-                    .ok_or_else(|| fault("experiment", format!("there is no preset {preset}; `sfers presets` lists them")))?;
+                let found = presets::find(preset).ok_or_else(|| fault("experiment", presets::unknown(preset)))?;
                 Source::from_text(found.name, found.text)
             }
             None => Source::from_file(&folder.join(&file.experiment))?,
@@ -96,11 +96,11 @@ impl Sweep {
             source.set("simulation.engine=planar")?;
         }
         if file.measures.is_empty() {
-            return Err(fault("measures", format!("is empty; choose from {}", Measures::names().join(", "))));
+            return Err(fault("measures", format!("is empty; choose from {}", definitions::names().join(", "))));
         }
         for (i, measure) in file.measures.iter().enumerate() {
-            if !Measures::names().contains(measure) {
-                return Err(fault("measures", format!("there is no {measure}; choose from {}", Measures::names().join(", "))));
+            if !definitions::names().contains(&measure.as_str()) {
+                return Err(fault("measures", words::not_one_of(measure, &definitions::names())));
             }
             if file.measures[..i].contains(measure) {
                 return Err(fault("measures", format!("{measure} stands there twice")));
@@ -132,7 +132,7 @@ impl Sweep {
     pub fn open(path: &Path, settings: &[String]) -> Result<Self, ConfigError> {
         let name = path.display().to_string();
         if let Some(preset) = name.strip_prefix("preset:") {
-            let unknown = || ConfigError::Unreadable { path: path.into(), reason: "there is no such preset".into() };
+            let unknown = || ConfigError::Unreadable { path: path.into(), reason: presets::unknown(preset) };
             let found = presets::find_sweep(preset).ok_or_else(unknown)?;
             return Self::with_settings(preset, found.text, Path::new(""), settings);
         }
@@ -229,7 +229,7 @@ fn axis(values: &Value) -> Result<Vec<Value>, String> {
         Value::Array(list) => list.clone(),
         Value::Table(_) => {
             let Range { from, to, count } =
-                values.clone().try_into().map_err(|error: toml::de::Error| error.message().to_owned())?;
+                values.clone().try_into().map_err(|error: toml::de::Error| words::toml_error(&error))?;
             if !(from.is_finite() && to.is_finite()) {
                 return Err("from and to must be finite".into());
             }

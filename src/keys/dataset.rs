@@ -1,0 +1,81 @@
+//! Keys of descriptions of measured data.
+
+use super::Default::{Else, Is, Needed};
+use super::Range::{Any, Positive};
+use super::Value::{Name, Number, Other, Path, Text, Word};
+use super::{File, Key, Section, experiment, key};
+use crate::recording::definitions;
+
+pub(super) static FILE: File = File {
+    name: "dataset",
+    about: "Measured data: what robot it was, which points were tracked, and a file per run or single numbers. `sfers diagnose` reads it.",
+    sections: &[DATASET, experiment::MATERIAL, experiment::ROBOT, experiment::FRICTION, MARKERS, NOISE, RUN, OBSERVATION],
+};
+
+pub(super) const DATASET: Section = Section {
+    name: "dataset",
+    heading: "[dataset]",
+    about: "What the data are called.",
+    keys: &[
+        key("name", Text, Else("the file's name"), "name of the data"),
+        key("about", Text, Is("\"\""), "a few words on them"),
+    ],
+};
+
+const MARKERS: Section = Section {
+    name: "markers",
+    heading: "[markers]",
+    about: "The tracked points: any name = distance from the left end along the robot, in mm. A run's columns are NAME_x_mm and NAME_z_mm.",
+    keys: &[],
+};
+
+const NOISE: Section = Section {
+    name: "noise",
+    heading: "[noise]",
+    about: "One standard deviation of the tracking, estimated from the data where it is absent. For single markers: MARKER_mm.",
+    keys: &[DEFAULT_NOISE],
+};
+
+pub(super) const DEFAULT_NOISE: Key =
+    key("default_mm", Number(Positive), Else("estimated"), "of all markers that have none of their own");
+
+pub(super) const RUN: Section = Section {
+    name: "run",
+    heading: "[[run]]",
+    about: "One run as measured.",
+    keys: &[
+        key("id", Text, Needed, "its name; no other run has it"),
+        key(
+            "file",
+            Path,
+            Needed,
+            "its CSV: t_s, v1_v, v2_v, ..., and NAME_x_mm or NAME_z_mm of markers; empty cells are missing values",
+        ),
+        key(
+            "role",
+            Word(&["auto", "fit", "held-out"]),
+            Is("\"auto\""),
+            "fit: parameters are fitted to it; held-out: models are judged by it; auto: the program decides",
+        ),
+    ],
+};
+
+pub(super) const OBSERVATION: Section = Section {
+    name: "observation",
+    heading: "[[observation]]",
+    about: "A single measured number instead of a time series.",
+    keys: &[
+        key("measure", Name("measure", definitions::names), Needed, "which measure it is"),
+        key("value", Number(Any), Needed, "its value, in the measure's unit"),
+        key("sigma", Number(Positive), Needed, "one standard deviation"),
+        key("drive", Other("a table"), Needed, "what it was measured under: the keys of [drive] in an experiment file"),
+        key("robot", Other("a table"), Else("as above"), "what replaces keys of [robot]"),
+        key("material", Other("a table"), Else("as above"), "what replaces keys of [material]"),
+        key(
+            "simulation",
+            Other("a table"),
+            Else("2 s on the planar engine in steps of 0.2 ms"),
+            "the keys of [simulation] in an experiment file",
+        ),
+    ],
+};
