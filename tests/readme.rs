@@ -19,8 +19,8 @@ const ELSEWHERE: [(&str, &str); 4] = [
 
 /// The blocks of a language.
 fn blocks(language: &str) -> Vec<&'static str> {
-    let starts = README.split(&format!("```{language}\n")).skip(1);
-    starts.map(|rest| rest.split_once("```").expect("blocks are closed").0).collect()
+    let start = format!("```{language}\n");
+    README.split(&start).skip(1).map(|rest| rest.split_once("```").expect("blocks are closed").0).collect()
 }
 
 #[test]

@@ -107,11 +107,10 @@ pub enum Default {
 pub static FILES: [&File; 3] = [&experiment::FILE, &sweep::FILE, &dataset::FILE];
 
 /// Units by the ends of names, longest first.
-const UNITS: [(&str, &str); 14] = [
+const UNITS: [(&str, &str); 13] = [
     ("_mm_per_s", "mm/s"),
     ("_pm_per_v", "pm/V"),
-    ("_kv_per_mm", "kV/mm"),
-    ("_v_per_um", "V/µm"),
+    ("_kv_mm", "kV/mm"),
     ("_g_cm3", "g/cm³"),
     ("_mm_s", "mm/s"),
     ("_m_s2", "m/s²"),
