@@ -162,8 +162,8 @@ fn the_folder_of_another_sweep_is_left_alone() {
     bench.done(&["s.toml", "--out", "out"]);
     let before = bench.read("out/results.csv");
     fs::write(bench.path("t.toml"), SWEEP.replace("0.04", "0.05")).unwrap();
-    bench.refuses(&["t.toml", "--out", "out"], 2, &["another sweep"]);
-    bench.refuses(&["s.toml", "--out", "out", "--set", "robot.positive_gain=2"], 2, &["another sweep"]);
+    bench.refuses(&["t.toml", "--out", "out"], 2, &["another sweep", "the values of robot.damping_eta differ"]);
+    bench.refuses(&["s.toml", "--out", "out", "--set", "robot.positive_gain=2"], 2, &["another sweep", "the settings differ"]);
     assert_eq!(bench.read("out/results.csv"), before);
     fs::write(bench.path("out/rows-1-of-1.csv"), "0,1.0\n").unwrap();
     bench.refuses(&["s.toml", "--out", "out"], 2, &["rows-1-of-1.csv", "line 1"]);
@@ -217,4 +217,85 @@ fn two_processes_do_not_work_on_the_same_rows() {
     bench.refuses(&["s.toml", "--out", "out"], 2, &["another sfers"]);
     child.kill().unwrap();
     child.wait().unwrap();
+}
+
+#[test]
+fn a_setting_replaces_the_only_value_of_a_key_and_is_refused_for_keys_that_vary() {
+    let bench = Bench::new();
+    let text = SWEEP.replace("[vary]", "[vary]\n\"simulation.steps\" = [5000]").replace("count = 4", "count = 1");
+    fs::write(bench.path("s.toml"), text).unwrap();
+    bench.done(&["s.toml", "--out", "long"]);
+    bench.done(&["s.toml", "--out", "short", "--set", "simulation.steps=1000"]);
+    let cells = |name: &str| -> Vec<(String, String)> {
+        let text = bench.read(name);
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        reader.records().map(Result::unwrap).map(|record| (record[0].to_owned(), record[3].to_owned())).collect()
+    };
+    let (long, short) = (cells("long/results.csv"), cells("short/results.csv"));
+    assert!(long.iter().all(|row| row.0 == "5000") && short.iter().all(|row| row.0 == "1000"), "{short:?}");
+    assert!(long.iter().zip(&short).all(|(a, b)| a.1 != b.1), "the setting changes nothing: {short:?}");
+    let setting = ["s.toml", "--out", "out", "--set"];
+    let refuses = |set: &str, words: &[&str]| bench.refuses(&[&setting[..], &[set]].concat(), 2, words);
+    refuses("drive.voltages_v=[-50]", &["--set drive.voltages_v=[-50]", "drive.voltages_v", "s.toml, line 6"]);
+    refuses("drive={waveform=\"dc\"}", &["drive.voltages_v", "s.toml, line 6"]);
+    refuses("simulation.steps=-1", &["--set simulation.steps=-1"]);
+    assert!(!bench.path("out").exists());
+}
+
+#[test]
+fn what_is_wrong_in_the_sweep_file_is_named_with_its_line() {
+    let bench = Bench::new();
+    let head = SWEEP.split("[vary]").next().unwrap();
+    for (vary, words) in [
+        ("\"robot.legs\" = [4]", ["s.toml, line 4, robot.legs = 4", "legs"]),
+        ("\"robot.damping_eta\" = [0.01, -0.01]", ["s.toml, line 4, robot.damping_eta = -0.01", "zero or more"]),
+        ("\"robot.damping_eta\" = []", ["s.toml, line 4", "no values"]),
+        ("\"robot.mount\" = [\"glued\"]", ["s.toml, line 4, robot.mount = \"glued\"", "clamped"]),
+    ] {
+        fs::write(bench.path("s.toml"), format!("{head}[vary]\n{vary}\n")).unwrap();
+        let output = bench.sweep(&["s.toml", "--out", "out"]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && words.iter().all(|word| text.contains(word)), "{text}");
+        assert!(!text.contains("--set"), "{text}");
+    }
+}
+
+#[test]
+fn a_drive_that_was_edited_is_another_sweep() {
+    let bench = Bench::new();
+    let drive = "waveform = \"csv\"\nfile = \"drive.csv\"";
+    fs::write(bench.path("a.toml"), EXPERIMENT.replace("waveform = \"dc\"\nvoltages_v = [0]", drive)).unwrap();
+    let text = "experiment = \"a.toml\"\nmeasures = [\"tip_deflection_mm\"]\n[vary]\n\"robot.damping_eta\" = [0.01, 0.02]\n";
+    fs::write(bench.path("s.toml"), text).unwrap();
+    fs::write(bench.path("drive.csv"), "t_s,v1_v\n0,-500\n").unwrap();
+    bench.done(&["s.toml", "--out", "out"]);
+    assert!(bench.done(&["s.toml", "--out", "out"]).contains("0 points computed"));
+    let before = bench.read("out/results.csv");
+    fs::write(bench.path("drive.csv"), "t_s,v1_v\n0,-600\n").unwrap();
+    for more in [&[][..], &["--keep-rows"], &["--merge"]] {
+        bench.refuses(&[&["s.toml", "--out", "out"], more].concat(), 2, &["another sweep", "the contents of drive.csv"]);
+    }
+    bench.done(&["s.toml", "--out", "other"]);
+    assert_ne!(bench.read("other/results.csv"), before);
+    assert_eq!(bench.read("out/results.csv"), before);
+}
+
+#[test]
+fn rows_of_another_revision_are_kept_only_if_the_user_says_so() {
+    let bench = Bench::new();
+    bench.done(&["s.toml", "--out", "out", "--shard", "1/2"]);
+    let identity = bench.read("out/sweep.json");
+    let mut object: serde_json::Value = serde_json::from_str(&identity).unwrap();
+    assert!(object["programs"][0].as_str().unwrap().contains("revision "), "{identity}");
+    object["programs"][0] = "sfers 0.0.9, revision 0123abc, Bullet 3.24 double".into();
+    let theirs = format!("{object:#}\n");
+    fs::write(bench.path("out/sweep.json"), &theirs).unwrap();
+    let arguments = ["s.toml", "--out", "out", "--shard", "2/2"];
+    bench.refuses(&arguments, 2, &["revision 0123abc", "and this is sfers", "--keep-rows", "another --out"]);
+    assert_eq!(bench.read("out/sweep.json"), theirs);
+    bench.done(&[&arguments[..], &["--keep-rows"]].concat());
+    assert!(bench.path("out/results.csv").exists());
+    // From now on the folder is of both.
+    assert!(bench.done(&arguments).contains("0 points computed"));
+    assert!(bench.read("out/sweep.json").contains("0123abc"));
 }

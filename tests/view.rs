@@ -74,6 +74,30 @@ fn every_kind_of_figure_is_xml_with_units_for_own_and_foreign_recordings() {
 }
 
 #[test]
+fn a_recording_in_csv_is_drawn_and_played_as_the_same_one_in_npz() {
+    let bench = Bench::new();
+    bench.done(&["run", "a.toml", "--out", "a.csv"]);
+    for kind in ["shapes", "traces"] {
+        let of = |input: &str| bench.done(&["plot", input, "--kind", kind, "--out", "-"]);
+        assert_eq!(of("a.csv"), of("a.npz"), "{kind}");
+    }
+    for (input, out) in [("a.npz", "n.html"), ("a.csv", "c.html")] {
+        bench.done(&["animate", input, "--speed", "0.3", "--out", out]);
+    }
+    let page = fs::read_to_string(bench.path("c.html")).unwrap();
+    assert_eq!(page, fs::read_to_string(bench.path("n.html")).unwrap());
+    assert!(page.contains("\"speed\":0.3,"), "the speed is not the one asked for");
+    // Without its manifest, a CSV does not say which joints are one actuator's.
+    fs::remove_file(bench.path("a.csv.manifest.json")).unwrap();
+    let output = bench.sfers(&["animate", "a.csv", "--out", "c.html"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && text.contains("a.csv.manifest.json is not there"), "{text}");
+    let table = fs::read_to_string(bench.path("a.csv")).unwrap();
+    fs::write(bench.path("a.csv"), table.replacen("node3_x_mm", "node3_x_cm", 1)).unwrap();
+    bench.refuses(&["plot", "a.csv", "--out", "b.svg"], 3, "node3_x_mm");
+}
+
+#[test]
 fn a_sweep_becomes_a_curve() {
     let bench = Bench::new();
     let sweep = "experiment = \"a.toml\"\nmeasures = [\"jump_height_mm\"]\n[vary]\n\"drive.frequency_hz\" = [10, 14, 18]\n";
@@ -198,10 +222,11 @@ impl Drop for Browser {
 #[test]
 fn the_page_plays_and_scrubs_in_a_browser_without_an_error() {
     let bench = Bench::new();
-    bench.done(&["animate", "a.npz", "--speed", "0.05", "--out", "a.html"]);
+    bench.done(&["animate", "a.npz", "--speed", "0.03", "--out", "a.html"]);
     let page = fs::read_to_string(bench.path("a.html")).unwrap();
     assert!(!page.contains("http://") && !page.contains("https://"), "the page is not self-contained");
     let mut browser = Browser::open(&bench.path("a.html"), &bench.path("profile"));
+    assert_eq!(browser.value("document.getElementById('speed').selectedOptions[0].textContent"), "× 0.03");
     assert_eq!(browser.value("window.sfers.frames"), 101);
     let first = browser.value("window.sfers.nodes");
     assert_eq!(first.as_array().unwrap().len(), 14);

@@ -1,13 +1,13 @@
 //! `sfers animate`: a recording as a page that plays it, or as a GIF.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::output::{finish, pending};
-use super::plot::extension;
-use super::{Failure, Options};
-use crate::experiment::{self, Control, Source};
-use crate::recording::npz;
+use super::plot::{self, extension};
+use super::run::source;
+use super::{Failure, Options, say};
+use crate::experiment::{self, Control, presets};
 use crate::view;
 
 /// Animate a recording: FILE.html plays, scrubs and shows voltages; FILE.gif is a film.
@@ -15,7 +15,8 @@ use crate::view;
 /// Example: sfers animate jump.npz --out jump.html
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A recording FILE.npz, this program's or the reference's; or an experiment FILE.toml, which is run first.
+    /// A recording, FILE.npz (this program's or the reference's) or FILE.csv (this program's); or an experiment, which is run first:
+    /// FILE.toml, `-` for standard input, preset:NAME, or NAME where there is no such file.
     input: PathBuf,
     /// FILE.html or FILE.gif.
     #[arg(long, value_name = "FILE")]
@@ -23,6 +24,13 @@ pub struct Args {
     /// Speed to begin with (1: real time); by default one that takes some seconds.
     #[arg(long, value_name = "X", value_parser = speed)]
     speed: Option<f64>,
+}
+
+/// Whether the input is an experiment rather than a recording of one.
+fn is_experiment(input: &Path) -> bool {
+    let name = input.to_str().unwrap_or_default();
+    let built_in = name.starts_with("preset:") || (!input.exists() && presets::text_of(name).is_some());
+    built_in || name == "-" || extension(input) == "toml"
 }
 
 fn speed(text: &str) -> Result<f64, String> {
@@ -35,20 +43,18 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         return Err(Failure::Usage(format!("{}: the name must end in .html or .gif", args.out.display())));
     }
     let file = pending(&args.out)?;
-    let recording = match extension(&args.input) {
-        "toml" => {
-            let experiment = experiment::experiment(&Source::from_file(&args.input)?)?;
+    let (title, recording) = match is_experiment(&args.input) {
+        true => {
+            let source = source(&args.input, &[])?;
+            let experiment = experiment::experiment(&source)?;
             let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
             // A film of a run that went wrong is worth seeing, but not without a word.
-            run.trouble(&experiment).iter().for_each(|trouble| eprintln!("warning: {trouble}"));
-            run.recording
+            run.trouble(&experiment).iter().for_each(|trouble| say(&format!("warning: {trouble}")));
+            (source.name, run.recording)
         }
-        _ => npz::read_file(&args.input)?,
+        false => (args.input.display().to_string(), plot::recording(&args.input, options)?),
     };
-    if recording.is_empty() {
-        return Err(Failure::Data(format!("{}: holds no records", args.input.display())));
-    }
-    let name = args.input.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let name = Path::new(&title).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let bytes = match kind {
         "html" => view::player(&name, &recording, args.speed).into_bytes(),
         _ => view::gif(&recording, args.speed).map_err(|reason| Failure::Data(format!("{}: {reason}", args.input.display())))?,

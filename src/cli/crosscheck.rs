@@ -22,7 +22,7 @@ use crate::recording::{Recording, npz};
 /// Example: sfers crosscheck jump.toml --pybullet .venv/bin/python
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Experiment files; `-` is standard input.
+    /// Experiment files, `-` for standard input, or preset:NAME (or NAME where there is no such file) for built-in ones.
     experiments: Vec<PathBuf>,
     /// Override a key in every experiment given. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "experiments")]
@@ -33,7 +33,7 @@ pub struct Args {
     /// A Python with pybullet 3.2.7 and numpy: builds and steps the same robot there.
     #[arg(long, value_name = "PYTHON")]
     pybullet: Option<PathBuf>,
-    /// A checkout of the authors' package: runs their classes, with the Python of --pybullet or else python3.
+    /// A checkout of the authors' package, or the folder src in it: runs their classes, with the Python of --pybullet or else python3.
     #[arg(long, value_name = "DIR")]
     sfers: Option<PathBuf>,
     /// Compare this program's two engines, Bullet at the experiment's time step and the planar one at --planar-step.

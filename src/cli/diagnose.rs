@@ -2,15 +2,17 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{finish, pending, unwritable};
-use super::{Failure, Options, print};
+use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::diagnose::dataset::{DataError, Dataset};
 use crate::diagnose::diagnosis::Verdict;
 use crate::diagnose::{extended, observations, protocols, quality, report, robot::RobotPlant, verdict};
+use crate::files::{FolderLock, Locking};
 
 /// Say what the simulation gets wrong beside measured data, name the cause, and measure what it gains on runs that no fit saw.
 ///
@@ -41,6 +43,46 @@ impl From<DataError> for Failure {
     }
 }
 
+/// What an interrupt needs to know.
+struct Work {
+    /// The lock on the folder of the results.
+    lock: Option<FolderLock>,
+    /// Whether the first file has been begun: all of them are there some milliseconds later, and the process ends by itself.
+    writing: bool,
+}
+
+static WORK: Mutex<Work> = Mutex::new(Work { lock: None, writing: false });
+
+fn work() -> MutexGuard<'static, Work> {
+    WORK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends the process, with the lock taken away, unless results are being written.
+fn interrupt() {
+    let mut work = work();
+    if !work.writing {
+        work.lock = None;
+        say("interrupted; nothing was written");
+        std::process::exit(INTERRUPTED.into());
+    }
+}
+
+/// Locks the folder of the results until the end of the process.
+fn lock(folder: &Path) -> Result<(), Failure> {
+    match FolderLock::take(folder).map_err(|error| unwritable(folder, &error))? {
+        Locking::Locked(lock) => work().lock = Some(lock),
+        Locking::Busy => {
+            let reason = "another sfers diagnose is working on it; wait for it, or give every process a folder of its own";
+            return Err(Failure::Usage(format!("{}: {reason}", folder.display())));
+        }
+        Locking::Unsupported => {
+            let reason = "this file system cannot lock files: two processes must not write to it";
+            say(&format!("warning: {}: {reason}", folder.display()));
+        }
+    }
+    Ok(())
+}
+
 fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
     finish(pending(&folder.join(name))?, text.as_bytes())
 }
@@ -49,6 +91,14 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let dataset = Dataset::read(&args.dataset)?;
     std::fs::create_dir_all(&args.out).map_err(|error| unwritable(&args.out, &error))?;
     drop(pending(&args.out.join("diagnosis.json"))?);
+    lock(&args.out)?;
+    let _ = ctrlc::set_handler(interrupt);
+    let result = diagnose(args, options, &dataset);
+    work().lock = None;
+    result
+}
+
+fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode, Failure> {
     let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(jobs)
@@ -63,14 +113,14 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let progress = |what: &str| bar.set_message(what.to_owned());
     let result = pool.install(|| {
         if dataset.runs.is_empty() {
-            return observations::diagnose(&dataset, &progress).map(|found| (found, None));
+            return observations::diagnose(dataset, &progress).map(|found| (found, None));
         }
-        let checked = quality::check(&dataset);
-        let plant = RobotPlant::new(&dataset, &checked);
+        let checked = quality::check(dataset);
+        let plant = RobotPlant::new(dataset, &checked);
         let roles: Vec<_> = dataset.runs.iter().map(|run| run.role).collect();
         let separate = |models: &[crate::diagnose::plant::Model]| protocols::separate(&plant, models);
         let outcome = verdict::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), &progress, &separate)?;
-        let files = extended::Files::new(&dataset, &plant, &outcome);
+        let files = extended::Files::new(dataset, &plant, &outcome);
         let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
         let context = report::Context { plant: &plant, command: &command, extended: &files.experiment };
         let page = report::page(&outcome, &context);
@@ -79,6 +129,19 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     bar.finish_and_clear();
     let (diagnosis, files) = result.map_err(Failure::Simulation)?;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(&args.out, &error))?;
+    let printed = if options.json {
+        print(&format!("{json}\n"))
+    } else {
+        let mut text = format!("{}\n", diagnosis.summary);
+        if let Some(next) = &diagnosis.next_experiment {
+            text += &format!("To tell them apart: {next}.\n");
+        }
+        for line in &diagnosis.unexplained {
+            text += &format!("What is left: {line}\n");
+        }
+        print(&text)
+    };
+    work().writing = true;
     if let Some((files, page)) = files {
         write(&args.out, "extended.toml", &files.experiment)?;
         write(&args.out, "drive.csv", &files.drive)?;
@@ -89,18 +152,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
     write(&args.out, "diagnosis.json", &format!("{json}\n"))?;
     options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
-    if options.json {
-        print(&format!("{json}\n"))?;
-    } else {
-        let mut text = format!("{}\n", diagnosis.summary);
-        if let Some(next) = &diagnosis.next_experiment {
-            text += &format!("To tell them apart: {next}.\n");
-        }
-        for line in &diagnosis.unexplained {
-            text += &format!("What is left: {line}\n");
-        }
-        print(&text)?;
-    }
+    printed?;
     let identified = matches!(diagnosis.verdict, Verdict::Named | Verdict::Tied);
     Ok(if args.require && !identified { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }

@@ -19,7 +19,7 @@ pub enum Format {
 /// What both commands take.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The experiment file; `-` is standard input.
+    /// The experiment file, `-` for standard input, or preset:NAME (or NAME where there is no such file) for a built-in one.
     experiment: PathBuf,
     /// Override a key, for example robot.actuators=3. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -50,7 +50,7 @@ pub fn run(format: Format, args: &Args, options: Options) -> Result<ExitCode, Fa
         return Ok(ExitCode::SUCCESS);
     }
     let file = pending(&args.out)?;
-    if format == Format::Urdf {
+    if format == Format::Urdf && !file.is_stream() {
         let mut beside = args.out.as_os_str().to_owned();
         beside.push(".json");
         let beside = pending(Path::new(&beside))?;

@@ -104,7 +104,7 @@ impl Options {
     /// A remark on stderr, unless the user wants none.
     fn remark(self, text: &str) {
         if !self.quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 }
@@ -112,7 +112,7 @@ impl Options {
 /// How a command can fail, by exit code.
 #[derive(Debug)]
 enum Failure {
-    /// 2: usage or config.
+    /// 2: usage, config, or an output that cannot be written.
     Usage(String),
     /// 3: input data unreadable or invalid.
     Data(String),
@@ -152,7 +152,9 @@ impl From<RecordingError> for Failure {
 impl From<CrosscheckError> for Failure {
     fn from(error: CrosscheckError) -> Self {
         match error {
-            CrosscheckError::NoPython { .. } | CrosscheckError::NoClass(_) => Self::Usage(error.to_string()),
+            CrosscheckError::NoPython { .. } | CrosscheckError::NoClass(_) | CrosscheckError::Temporary(_) => {
+                Self::Usage(error.to_string())
+            }
             _ => Self::Data(error.to_string()),
         }
     }
@@ -168,6 +170,11 @@ impl From<io::Error> for Failure {
     }
 }
 
+/// Writes a line to standard error. `eprintln!` would panic where it cannot be written.
+fn say(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
 /// Writes to standard output. `println!` would panic when the reader has gone.
 fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
@@ -181,8 +188,11 @@ pub fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             // Help goes to stdout with code 0, errors to stderr with code 2. A closed pipe is no reason to complain.
-            let _ = error.print();
-            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+            let code = match error.print() {
+                Err(failure) if failure.kind() != io::ErrorKind::BrokenPipe => 2,
+                _ => u8::try_from(error.exit_code()).unwrap_or(2),
+            };
+            return ExitCode::from(code);
         }
     };
     let options = Options { quiet: cli.quiet, json: cli.json };
@@ -214,7 +224,7 @@ pub fn main() -> ExitCode {
         Err(Failure::Data(message)) => (3, message),
         Err(Failure::Simulation(message)) => (4, message),
     };
-    eprintln!("error: {message}");
+    say(&format!("error: {message}"));
     ExitCode::from(code)
 }
 

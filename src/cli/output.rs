@@ -28,7 +28,8 @@ pub struct Output {
 /// The result and its manifest.
 struct Files {
     result: Pending,
-    manifest: Pending,
+    /// None beside a pipe or a device.
+    manifest: Option<Pending>,
 }
 
 /// The failure that a file cannot be written.
@@ -49,7 +50,9 @@ impl Output {
         };
         let mut manifest = path.as_os_str().to_owned();
         manifest.push(".manifest.json");
-        let files = Files { result: pending(path)?, manifest: pending(Path::new(&manifest))? };
+        let result = pending(path)?;
+        let manifest = if result.is_stream() { None } else { Some(pending(Path::new(&manifest))?) };
+        let files = Files { result, manifest };
         Ok(Self { path: path.into(), format, files: Some(files) })
     }
 
@@ -74,7 +77,7 @@ impl Output {
             return Ok(io::stdout().lock().write_all(&bytes)?);
         };
         finish(result, &bytes)?;
-        finish(manifest_file, format!("{manifest:#}\n").as_bytes())
+        manifest_file.map_or(Ok(()), |file| finish(file, format!("{manifest:#}\n").as_bytes()))
     }
 }
 
@@ -104,16 +107,35 @@ pub fn manifest(experiment: &crate::experiment::Experiment, wall_s: f64, interru
         "seed": null,
         "interrupted": interrupted,
         "wall_s": wall_s,
-        "finished": date_time('-'),
+        "finished": now().iso(),
     })
 }
 
-/// Date and time now in UTC, `MM_DD_YYYY_HH_MM` as in the reference's recordings for `_`.
-pub fn date_time(separator: char) -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs());
-    let (year, month, day) = civil(seconds / 86400);
-    let s = separator;
-    format!("{month:02}{s}{day:02}{s}{year:04}{s}{:02}{s}{:02}", seconds / 3600 % 24, seconds / 60 % 60)
+/// Date and time in UTC.
+#[derive(Debug, Clone, Copy)]
+pub struct DateTime {
+    /// Since 1970-01-01 00:00:00 (s).
+    seconds: u64,
+}
+
+/// The time now.
+pub fn now() -> DateTime {
+    DateTime { seconds: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |elapsed| elapsed.as_secs()) }
+}
+
+impl DateTime {
+    /// ISO 8601: `2026-05-01T12:00:00Z`.
+    pub fn iso(self) -> String {
+        let (year, month, day) = civil(self.seconds / 86400);
+        let s = self.seconds;
+        format!("{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z", s / 3600 % 24, s / 60 % 60, s % 60)
+    }
+
+    /// `MM_DD_YYYY_HH_MM`, as in the reference's recordings.
+    pub fn of_the_reference(self) -> String {
+        let (year, month, day) = civil(self.seconds / 86400);
+        format!("{month:02}_{day:02}_{year:04}_{:02}_{:02}", self.seconds / 3600 % 24, self.seconds / 60 % 60)
+    }
 }
 
 /// Year, month and day of a number of days since 1970-01-01, counted off year by year and month by month.
@@ -136,6 +158,13 @@ fn civil(mut days: u64) -> (u64, usize, u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_are_iso_8601_and_in_recordings_as_the_reference_writes_them() {
+        let time = DateTime { seconds: 20574 * 86400 + 43_209 };
+        assert_eq!(time.iso(), "2026-05-01T12:00:09Z");
+        assert_eq!(time.of_the_reference(), "05_01_2026_12_00");
+    }
 
     #[test]
     fn days_become_dates_across_leap_years() {

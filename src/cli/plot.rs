@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use super::output::{finish, pending};
 use super::{Failure, Options, print};
-use crate::recording::npz;
+use crate::recording::{Recording, csv, npz};
 use crate::view::{self, Kind, ResultsError};
 
 /// Draw a recording or the results of a sweep as SVG.
@@ -13,7 +13,7 @@ use crate::view::{self, Kind, ResultsError};
 /// Example: sfers plot jump.npz --kind traces --out jump.svg
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A recording FILE.npz, this program's or the reference's, or a sweep's results.csv.
+    /// A recording, FILE.npz (this program's or the reference's) or FILE.csv (this program's), or a sweep's results.csv.
     input: PathBuf,
     /// The figure, FILE.svg; `-` is standard output.
     #[arg(long, value_name = "FILE")]
@@ -31,6 +31,21 @@ pub fn extension(path: &Path) -> &str {
     path.extension().and_then(|extension| extension.to_str()).unwrap_or("")
 }
 
+/// Reads a recording, FILE.npz or FILE.csv, with a word on what a CSV without its manifest leaves open.
+pub fn recording(path: &Path, options: Options) -> Result<Recording, Failure> {
+    let recording = if extension(path) == "csv" {
+        let (recording, open) = csv::read_file(path)?;
+        open.into_iter().for_each(|words| options.remark(&format!("warning: {words}")));
+        recording
+    } else {
+        npz::read_file(path)?
+    };
+    if recording.is_empty() {
+        return Err(Failure::Data(format!("{}: holds no records", path.display())));
+    }
+    Ok(recording)
+}
+
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let to_stdout = args.out == Path::new("-");
     if !to_stdout && extension(&args.out) != "svg" {
@@ -38,16 +53,11 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
     let file = if to_stdout { None } else { Some(pending(&args.out)?) };
     let svg = match extension(&args.input) {
-        "npz" => {
-            let recording = npz::read_file(&args.input)?;
-            if recording.is_empty() {
-                return Err(Failure::Data(format!("{}: holds no records", args.input.display())));
-            }
-            args.kind.figure(&recording).svg()
-        }
+        "npz" => args.kind.figure(&recording(&args.input, options)?).svg(),
+        "csv" if csv::is_recording(&args.input) => args.kind.figure(&recording(&args.input, options)?).svg(),
         "csv" => {
             let data = |reason: String| Failure::Data(format!("{}: {reason}", args.input.display()));
-            let text = std::fs::read_to_string(&args.input).map_err(|error| data(error.to_string()))?;
+            let text = crate::files::read_text(&args.input).map_err(|error| data(error.to_string()))?;
             view::results(&text, args.measure.as_deref()).map_err(|error| match error {
                 ResultsError::Table(reason) => data(reason),
                 ResultsError::Choice(reason) => Failure::Usage(format!("{}: {reason}", args.input.display())),

@@ -8,7 +8,7 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::output::{finish, pending, unwritable};
-use super::{Failure, INTERRUPTED, Options, print};
+use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::reproduce::{Bench, Effort, Findings, STUDIES, Study, StudyError, page, table};
 use crate::words;
 
@@ -75,7 +75,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         let start = Instant::now();
         let result = match study.run(&bench) {
             Err(StudyError::Interrupted) => {
-                eprintln!("interrupted; the same command goes on from here");
+                say("interrupted; the same command goes on from here");
                 return Ok(ExitCode::from(INTERRUPTED));
             }
             Err(StudyError::Rows(error)) => return Err(error.into()),

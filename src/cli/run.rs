@@ -8,12 +8,13 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::output::{Output, date_time, finish, manifest, pending, unwritable};
-use super::{Failure, INTERRUPTED, Options, print};
+use super::output::{Output, finish, manifest, now, pending, unwritable};
+use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::analytic;
 use crate::engine::Engine;
-use crate::experiment::{self, Control, EngineKind, Experiment, Run, SavedState, Source};
+use crate::experiment::{self, Control, EngineKind, Experiment, Run, SavedState, Setting, Source};
 use crate::export;
+use crate::files;
 use crate::recording::measures::Measures;
 
 /// Simulate an experiment and print its measures.
@@ -21,7 +22,7 @@ use crate::recording::measures::Measures;
 /// Example: sfers preset jump-14hz | sfers run - --set drive.frequency_hz=12 --out jump.npz
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The experiment file; `-` is standard input.
+    /// The experiment file, `-` for standard input, or preset:NAME (or NAME where there is no such file) for a built-in one.
     experiment: PathBuf,
     /// Override a key, for example robot.damping_eta=0.03. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -47,17 +48,16 @@ static INTERRUPT: AtomicBool = AtomicBool::new(false);
 
 /// Reads a file, or standard input for `-`.
 fn read(path: &Path) -> std::io::Result<String> {
-    if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) }
+    if path == Path::new("-") { files::read_stdin() } else { files::read_text(path) }
 }
 
-/// Reads an experiment from a file or standard input, with settings.
+/// Reads an experiment from a file, standard input or the built-in ones, with settings.
 pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
     let mut source = if path == Path::new("-") {
-        let text =
-            std::io::read_to_string(std::io::stdin()).map_err(|error| Failure::Usage(format!("standard input: {error}")))?;
+        let text = files::read_stdin().map_err(|error| Failure::Usage(format!("standard input: {error}")))?;
         Source::from_text("standard input", text)
     } else {
-        Source::from_file(path)?
+        Source::open(path)?
     };
     for setting in settings {
         source.set(setting)?;
@@ -68,7 +68,15 @@ pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let mut source = source(&args.experiment, &args.settings)?;
     if let Some(engine) = &args.engine {
-        source.set(&format!("simulation.engine={engine}"))?;
+        let key = "simulation.engine";
+        let set = source.settings().iter().rev().find(|setting| setting.key == key);
+        if let Some(other) = set.filter(|setting| setting.toml().as_str() != Some(engine)) {
+            return Err(Failure::Usage(format!(
+                "--engine {engine} and {} contradict each other; give one of the two",
+                other.place
+            )));
+        }
+        source.push(Setting { key: key.into(), value: engine.clone(), place: format!("--engine {engine}") });
     }
     let mut experiment = experiment::experiment(&source)?;
     if let Some(path) = &args.robot {
@@ -114,18 +122,18 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let trouble = run.trouble(&experiment);
     for problem in &trouble {
         // Even when quiet: the result is not what was asked for.
-        eprintln!("warning: {problem}; no measures are given");
+        say(&format!("warning: {problem}; no measures are given"));
     }
     let Run { mut recording, interrupted, energy, audited, .. } = run;
     let steps = recording.meta.steps;
     if interrupted {
         let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
         let message = format!("interrupted after {steps} of {} steps; what was recorded until then is {kept}", experiment.steps);
-        eprintln!("{message}");
+        say(&message);
         warnings.push(message);
     }
     if let Some(ground) = &mut recording.meta.ground {
-        ground.date_time = date_time('_');
+        ground.date_time = now().of_the_reference();
     }
 
     let measures = if trouble.is_empty() {
@@ -138,14 +146,6 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);
-    if let Some(file) = state_file {
-        let state = SavedState::of(&experiment, engine.as_ref())?;
-        let text = serde_json::to_string(&state).map_err(|error| unwritable(file.path(), &error))?;
-        finish(file, text.as_bytes())?;
-    }
-    if let Some(output) = output {
-        output.write(&recording, &manifest(&experiment, wall, interrupted))?;
-    }
     let text = if options.json {
         let object = json!({
             "schema": 1,
@@ -166,24 +166,37 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     } else {
         let measures: String = measures.named().into_iter().map(|(name, value)| format!("{name} = {value:.6}\n")).collect();
         options.remark(&format!(
-            "{steps} steps of {:e} s in {wall:.2} s ({steps_per_s:.0} steps/s), {} records{}",
+            "{steps} steps of {:e} s in {wall:.2} s ({steps_per_s:.0} steps/s), {} records",
             experiment.time_step,
-            recording.len(),
-            saved.map_or_else(String::new, |path| format!(", saved to {}", path.display()))
+            recording.len()
         ));
         measures
     };
-    if to_stdout {
+    // The measures come before the files, so that a full disk does not take them along; and a closed pipe takes no file along.
+    let printed = if to_stdout {
         options.remark(text.trim_end());
+        Ok(())
     } else {
-        print(&text)?;
+        print(&text)
+    };
+    if let Some(file) = state_file {
+        let state = SavedState::of(&experiment, engine.as_ref())?;
+        let text = serde_json::to_string(&state).map_err(|error| unwritable(file.path(), &error))?;
+        finish(file, text.as_bytes())?;
     }
+    if let Some(output) = output {
+        output.write(&recording, &manifest(&experiment, wall, interrupted))?;
+    }
+    if let Some(path) = saved {
+        options.remark(&format!("saved to {}", path.display()));
+    }
+    printed?;
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
 fn load_state(path: &Path, experiment: &Experiment, engine: &mut dyn Engine) -> Result<(), Failure> {
     let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| bad(error.to_string()))?;
+    let text = files::read_text(path).map_err(|error| bad(error.to_string()))?;
     let state = SavedState::parse(&text, experiment).map_err(bad)?;
     if state.step >= experiment.steps {
         return Err(bad(format!(

@@ -8,7 +8,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::{Failure, INTERRUPTED, Options, print};
+use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::sweep::{self, Outcome, RowError, Sweep};
 
 /// Run an experiment over a grid of values; results in DIR/results.csv.
@@ -18,7 +18,7 @@ use crate::sweep::{self, Outcome, RowError, Sweep};
 /// Example: sfers preset jump-on-time-scan > scan.toml && sfers sweep scan.toml --out scan
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The sweep file, or preset:NAME.
+    /// The sweep file, preset:NAME, or NAME where there is no such file.
     sweep: PathBuf,
     /// Folder of the results.
     #[arg(long, value_name = "DIR")]
@@ -32,9 +32,12 @@ pub struct Args {
     /// Compute nothing: gather the rows-*.csv of all shards in DIR into DIR/results.csv, if no point is missing.
     #[arg(long, conflicts_with_all = ["shard", "jobs"])]
     merge: bool,
-    /// Override a key of the experiment. May be repeated.
+    /// Override a key of the experiment, or the value of a key in [vary] that has only one. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
+    /// Keep the rows that another revision of the program, or another Bullet, computed in DIR, and go on with this one.
+    #[arg(long)]
+    keep_rows: bool,
 }
 
 fn shard(text: &str) -> Result<(usize, usize), String> {
@@ -50,7 +53,7 @@ static INTERRUPT: AtomicBool = AtomicBool::new(false);
 impl From<RowError> for Failure {
     fn from(error: RowError) -> Self {
         match error {
-            RowError::Foreign { .. } | RowError::Io { .. } => Self::Usage(error.to_string()),
+            RowError::Foreign { .. } | RowError::OtherProgram { .. } | RowError::Io { .. } => Self::Usage(error.to_string()),
             RowError::Incomplete { .. } => Self::Data(error.to_string()),
         }
     }
@@ -59,14 +62,21 @@ impl From<RowError> for Failure {
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let sweep = Sweep::open(&args.sweep, &args.settings)?;
     let start = Instant::now();
-    let outcome = if args.merge { None } else { Some(compute(args, &sweep, options)?) };
+    if args.keep_rows {
+        sweep::adopt(&args.out, &sweep)?;
+    }
+    let advise = |error| match error {
+        RowError::OtherProgram { .. } => Failure::Usage(format!("{error}, or keep its rows with --keep-rows")),
+        other => other.into(),
+    };
+    let outcome = if args.merge { None } else { Some(compute(args, &sweep, options).map_err(advise)?) };
     let wall_s = start.elapsed().as_secs_f64();
     let interrupted = outcome.is_some_and(|outcome| outcome.interrupted);
     // A shard that ends last finds all rows there; one that does not leaves the results to the merge.
     let results = match sweep::merge(&args.out, &sweep) {
         Ok(path) => Some(path),
         Err(RowError::Incomplete { .. }) if !args.merge => None,
-        Err(error) => return Err(error.into()),
+        Err(error) => return Err(advise(error)),
     };
     let Outcome { before, computed, failed, .. } = outcome.unwrap_or_default();
     if let Some(outcome) = outcome {
@@ -76,7 +86,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         ));
     }
     if interrupted {
-        eprintln!("interrupted; the same command goes on from here");
+        say("interrupted; the same command goes on from here");
     } else if results.is_none() {
         options.remark("other shards are missing; gather their rows-*.csv in one folder and use --merge");
     }
@@ -100,14 +110,16 @@ fn compute(args: &Args, sweep: &Sweep, options: Options) -> Result<Outcome, RowE
     }
     let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), usize::from);
     let first = AtomicBool::new(true);
-    let outcome = sweep::run(sweep, &args.out, args.shard.unwrap_or((1, 1)), jobs, &INTERRUPT, |done, points| {
+    let progress = |done: usize, points: usize| {
         bar.set_length(points as u64);
         bar.set_position(done as u64);
         if first.swap(false, Ordering::Relaxed) {
             // Points of an earlier start are no measure of this one's speed.
             bar.reset_eta();
         }
-    });
+    };
+    let warn = |warning: &str| say(&format!("warning: {warning}"));
+    let outcome = sweep::run(sweep, &args.out, args.shard.unwrap_or((1, 1)), jobs, &INTERRUPT, progress, warn);
     bar.finish_and_clear();
     outcome
 }

@@ -3,7 +3,7 @@
 This is the second far side of `sfers crosscheck`: not the recipe rewritten (that is reference.py) but the published classes, from a
 checkout on disk. Input, one JSON object on standard input:
 
-    sfers_dir   folder that holds the package `sfers`
+    sfers_dir   folder that holds the package `sfers`, or a checkout that holds it in `src`
     class       name of a class in sfers.robot_simulation.inchworm_envs
     parameter   its parameter set, for example "trimorph parameter 2"
     settings    attributes to set before the drive, by name
@@ -49,8 +49,10 @@ def fail(message):
 
 def load_class(directory, name):
     """The class `name` of the checkout in `directory`."""
+    if os.path.isdir(os.path.join(directory, "src", "sfers")):
+        directory = os.path.join(directory, "src")
     if not os.path.isdir(os.path.join(directory, "sfers")):
-        fail(f"{directory} does not hold the package sfers; give the folder above it")
+        fail(f"{directory} does not hold the package sfers, nor does a folder src in it; give the root of a checkout")
     sys.path.insert(0, directory)
     try:
         module = importlib.import_module(MODULE)

@@ -174,7 +174,7 @@ impl Dataset {
         let preset = path.to_str().and_then(|path| path.strip_prefix("preset:")).and_then(presets::find_dataset);
         let text = match preset {
             Some(preset) => preset.text.to_owned(),
-            None => std::fs::read_to_string(path)
+            None => crate::files::read_text(path)
                 .map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?,
         };
         let description: Description = toml::from_str(&text).map_err(|error| ConfigError::Syntax {
@@ -301,7 +301,8 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
 type RunData = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>, Vec<String>);
 
 fn read_run(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<RunData, DataError> {
-    let bytes = std::fs::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
+    let bytes =
+        crate::files::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
     parse_run(&bytes, robot.actuators, markers).map_err(|Wrong { line, column, reason }| match line {
         0 => DataError::Unreadable { path: path.into(), reason },
         _ => DataError::Content { path: path.into(), line, column, reason },

@@ -8,6 +8,7 @@ use thiserror::Error;
 use toml::Table;
 use toml::de::{DeTable, DeValue};
 
+use super::presets;
 use crate::words;
 
 /// An experiment that cannot be run as it is written.
@@ -74,6 +75,13 @@ pub struct Config {
     pub simulation: SimulationConfig,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<EffectConfig>,
+}
+
+impl Config {
+    /// The files that it refers to, as they are written: a new key that names a file belongs here, or sweeps do not notice its changes.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.drive.file.as_deref().into_iter()
+    }
 }
 
 /// One `[[effect]]`: its id and its parameters.
@@ -201,7 +209,47 @@ pub struct Source {
     /// Folder that relative paths start from.
     pub folder: PathBuf,
     text: String,
-    settings: Vec<(String, String)>,
+    settings: Vec<Setting>,
+}
+
+/// A key that overrides the text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// The key, with dots.
+    pub key: String,
+    /// Its value, in TOML or as a bare word.
+    pub value: String,
+    /// Where it was given, for messages.
+    pub place: String,
+}
+
+impl Setting {
+    /// Reads `KEY=VALUE`, as given to `--set`.
+    ///
+    /// # Errors
+    /// [`ConfigError::Syntax`] if there is no `=` or no key.
+    pub fn parse(assignment: &str) -> Result<Self, ConfigError> {
+        match assignment.split_once('=') {
+            Some((key, value)) if !key.trim().is_empty() => {
+                let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
+                Ok(Self { place: format!("--set {key}={value}"), key, value })
+            }
+            _ => Err(ConfigError::Syntax {
+                source_name: format!("--set {assignment}"),
+                message: "a setting is written KEY=VALUE, for example robot.damping_eta=0.03".into(),
+            }),
+        }
+    }
+
+    /// The value: TOML if it is that, a string otherwise.
+    pub fn toml(&self) -> toml::Value {
+        // `v = VALUE` is TOML if VALUE is; a bare word is taken as a string.
+        toml::from_str::<Table>(&format!("v = {}", self.value))
+            .ok()
+            .filter(|table| table.len() == 1)
+            .and_then(|mut table| table.remove("v"))
+            .unwrap_or_else(|| toml::Value::String(self.value.clone()))
+    }
 }
 
 impl Source {
@@ -215,10 +263,27 @@ impl Source {
     /// # Errors
     /// [`ConfigError::Unreadable`] if the file cannot be read as UTF-8 text.
     pub fn from_file(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path)
+        let text = crate::files::read_text(path)
             .map_err(|error| ConfigError::Unreadable { path: path.into(), reason: error.to_string() })?;
         let folder = path.parent().map(PathBuf::from).unwrap_or_default();
         Ok(Self { folder, ..Self::from_text(path.display().to_string(), text) })
+    }
+
+    /// An experiment from a file, or a built-in one: `preset:NAME`, or `NAME` where there is no file of that name.
+    ///
+    /// # Errors
+    /// [`ConfigError::Unreadable`] if there is neither.
+    pub fn open(path: &Path) -> Result<Self, ConfigError> {
+        let name = path.to_str().unwrap_or_default();
+        let prefixed = name.strip_prefix("preset:");
+        if prefixed.is_none() && path.exists() {
+            return Self::from_file(path);
+        }
+        let preset = prefixed.unwrap_or(name);
+        presets::text_of(preset).map(|text| Self::from_text(preset, text)).ok_or_else(|| {
+            let file = if prefixed.is_some() { "" } else { "no such file, and " };
+            ConfigError::Unreadable { path: path.into(), reason: format!("{file}{}", presets::unknown(preset)) }
+        })
     }
 
     /// Adds a setting `KEY=VALUE`, with the value in TOML or as a bare word.
@@ -226,16 +291,13 @@ impl Source {
     /// # Errors
     /// [`ConfigError::Syntax`] if there is no `=` or no key.
     pub fn set(&mut self, assignment: &str) -> Result<(), ConfigError> {
-        match assignment.split_once('=') {
-            Some((key, value)) if !key.trim().is_empty() => {
-                self.settings.push((key.trim().to_owned(), value.trim().to_owned()));
-                Ok(())
-            }
-            _ => Err(ConfigError::Syntax {
-                source_name: format!("--set {assignment}"),
-                message: "a setting is written KEY=VALUE, for example robot.damping_eta=0.03".into(),
-            }),
-        }
+        self.settings.push(Setting::parse(assignment)?);
+        Ok(())
+    }
+
+    /// Adds a setting whose place is not `--set`.
+    pub fn push(&mut self, setting: Setting) {
+        self.settings.push(setting);
     }
 
     /// The text, without the settings.
@@ -243,8 +305,8 @@ impl Source {
         &self.text
     }
 
-    /// The settings, as keys and values.
-    pub fn settings(&self) -> &[(String, String)] {
+    /// The settings, in the order in which they are applied.
+    pub fn settings(&self) -> &[Setting] {
         &self.settings
     }
 
@@ -261,17 +323,10 @@ impl Source {
         }
         let mut table: Table =
             toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), words::toml_error(&error)))?;
-        for (key, value) in &self.settings {
-            let name = || format!("--set {key}={value}");
-            // `v = VALUE` is TOML if VALUE is; a bare word is taken as a string.
-            let parsed = toml::from_str::<Table>(&format!("v = {value}"))
-                .ok()
-                .filter(|table| table.len() == 1)
-                .and_then(|mut table| table.remove("v"))
-                .unwrap_or_else(|| toml::Value::String(value.clone()));
-            assign(&mut table, key, parsed).map_err(|message| syntax(name(), message))?;
+        for setting in &self.settings {
+            assign(&mut table, &setting.key, setting.toml()).map_err(|message| syntax(setting.place.clone(), message))?;
             // Checked one by one, so that the message names the setting at fault.
-            table.clone().try_into::<Config>().map_err(|error| syntax(name(), words::toml_error(&error)))?;
+            table.clone().try_into::<Config>().map_err(|error| syntax(setting.place.clone(), words::toml_error(&error)))?;
         }
         table.try_into().map_err(|error: toml::de::Error| syntax(self.name.clone(), words::toml_error(&error)))
     }
@@ -279,9 +334,9 @@ impl Source {
     /// Says where a key's value came from.
     pub(super) fn locate(&self, fault: Fault) -> ConfigError {
         let Fault { key, message } = fault;
-        let set = self.settings.iter().rev().find(|(set, _)| *set == key);
-        let place = match (set, line_of(&self.text, &key)) {
-            (Some((key, value)), _) => format!("--set {key}={value}"),
+        let set = self.settings.iter().rev().find(|set| set.key == key);
+        let place = match (set, line_of(&self.text, key.split('.'))) {
+            (Some(set), _) => set.place.clone(),
             (None, Some(line)) => format!("{}, line {line}", self.name),
             (None, None) => self.name.clone(),
         };
@@ -303,12 +358,12 @@ fn assign(table: &mut Table, key: &str, value: toml::Value) -> Result<(), String
     }
 }
 
-/// Line (from 1) of the deepest part of a dotted key that the text contains.
-fn line_of(text: &str, key: &str) -> Option<usize> {
+/// Line (from 1) of the deepest part of a key that the text contains.
+pub(crate) fn line_of<'a>(text: &str, key: impl IntoIterator<Item = &'a str>) -> Option<usize> {
     let parsed = DeTable::parse(text).ok()?;
     let mut table = parsed.get_ref();
     let mut found = None;
-    for part in key.split('.') {
+    for part in key {
         let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref().as_ref() == part) else { break };
         found = Some(name.span().start);
         match value.get_ref() {

@@ -10,7 +10,7 @@ use crate::drive::Table;
 /// # Errors
 /// [`ConfigError::Data`] names the file and the line: a missing column, a cell that is no number, times that do not rise.
 pub fn read(path: &Path, actuators: usize) -> Result<Table, ConfigError> {
-    let bytes = std::fs::read(path).map_err(|error| ConfigError::Data { path: path.into(), reason: error.to_string() })?;
+    let bytes = crate::files::read(path).map_err(|error| ConfigError::Data { path: path.into(), reason: error.to_string() })?;
     parse(&bytes, actuators).map_err(|reason| ConfigError::Data { path: path.into(), reason })
 }
 

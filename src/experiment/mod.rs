@@ -12,9 +12,10 @@ mod state;
 #[cfg(test)]
 pub(crate) use auto::DEFAULT_STEP_ERROR;
 pub use auto::StepChoice;
+pub(crate) use config::line_of;
 pub use config::{
-    Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, SimulationConfig,
-    Source, StepConfig,
+    Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, Setting,
+    SimulationConfig, Source, StepConfig,
 };
 pub use resolve::{check, experiment};
 pub(crate) use run::hermite;

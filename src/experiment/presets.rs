@@ -143,6 +143,11 @@ pub fn find(name: &str) -> Option<&'static Preset> {
     PRESETS.iter().find(|preset| preset.name == name)
 }
 
+/// The text of the built-in experiment of that name, or of the reference's class.
+pub fn text_of(name: &str) -> Option<String> {
+    find_class(name).map(Class::text).or_else(|| find(name).map(|preset| preset.text.to_owned()))
+}
+
 /// The built-in data set of that name: measured numbers for `sfers diagnose`.
 pub fn find_dataset(name: &str) -> Option<&'static Preset> {
     DATASETS.iter().find(|preset| preset.name == name)

@@ -10,12 +10,11 @@ use crate::effects::{self, Applied, EffectError};
 use crate::engine::FrictionModel;
 use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
 use crate::model::{Damping, Extensions, Film, Friction, Material, ModelError, Mount, Robot};
+use crate::recording::MAX_VALUES;
 use crate::words::{not_one_of, number};
 
 /// The reference's `dampingEta` where a file gives no damping.
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
-/// Most numbers that a recording may hold: 3.2 GB.
-const MAX_RECORDED_VALUES: f64 = 4e8;
 const DEFAULT_ON_VOLTAGES: [f64; 5] = [520.0, 520.0, -1500.0, 520.0, 520.0];
 
 /// What may go wrong on the way: a value, or a file that a value names.
@@ -245,8 +244,8 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
         return Err(Fault::new(record_key, format!("is {record_every} steps, but the run has {steps}")));
     }
     let values = (steps / record_every + 2) as f64 * (10.0 * robot.joints() as f64 + 13.0);
-    if values > MAX_RECORDED_VALUES {
-        let least = (record_every as f64 * values / MAX_RECORDED_VALUES).ceil();
+    if values > MAX_VALUES {
+        let least = (record_every as f64 * values / MAX_VALUES).ceil();
         return Err(Fault::new(
             record_key,
             format!("{values:.1e} numbers would be recorded; record at most every {least:.0} steps"),

@@ -1,10 +1,13 @@
 //! Recordings as CSV, with the unit in every column's name.
 
-use std::io::Write;
-use std::path::Path;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 
-use super::{Recording, RecordingError};
-use crate::model::units::mm_from_cm;
+use serde_json::Value;
+
+use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError};
+use crate::files;
+use crate::model::units::{cm_from_mm, mm_from_cm};
 
 /// Writes a recording: time, then angle, rate, torque and voltage of each joint, then x and z of each node. y is left out.
 ///
@@ -18,28 +21,121 @@ pub fn write(recording: &Recording, writer: impl Write, path: &Path) -> Result<(
     result.map_err(|error| RecordingError::Unwritable { path: path.into(), reason: error.to_string() })
 }
 
-fn rows<W: Write>(recording: &Recording, table: &mut csv::Writer<W>) -> csv::Result<()> {
-    let (joints, nodes) = (recording.joints(), recording.nodes());
-    let columns: [(&str, &str, &[f64]); 4] = [
-        ("theta", "rad", &recording.angles),
-        ("rate", "rad_s", &recording.rates),
-        ("torque", "dyn_cm", &recording.torques),
-        ("motor_voltage", "v", &recording.motor_voltages),
-    ];
-    table.write_field("t_s")?;
-    for (name, unit, _) in columns {
-        for joint in 1..=joints {
-            table.write_field(format!("{name}{joint}_{unit}"))?;
+/// Name and unit of the quantities of joints, in the order of the columns.
+const OF_JOINTS: [(&str, &str); 4] = [("theta", "rad"), ("rate", "rad_s"), ("torque", "dyn_cm"), ("motor_voltage", "v")];
+
+/// The columns for a number of joints.
+fn header(joints: usize) -> Vec<String> {
+    let of_joints = OF_JOINTS.iter().flat_map(|(name, unit)| (1..=joints).map(move |joint| format!("{name}{joint}_{unit}")));
+    let of_nodes = (0..joints + 2).flat_map(|node| ["x", "z"].map(|axis| format!("node{node}_{axis}_mm")));
+    std::iter::once("t_s".to_owned()).chain(of_joints).chain(of_nodes).collect()
+}
+
+/// Whether a file begins as a recording does: other tables of this program begin otherwise.
+pub fn is_recording(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut start));
+    read.is_ok() && start.starts_with(b"t_s,theta1_rad,")
+}
+
+/// Reads a recording that [`write`] wrote. y and the nodes' velocities, which are not in it, are NaN. What only the manifest beside it
+/// knows (which joints share an actuator, whether there is a floor) is taken from there; without one, every joint counts as an
+/// actuator, and the words returned say so.
+///
+/// # Errors
+/// [`RecordingError::Unreadable`] with the line.
+pub fn read_file(path: &Path) -> Result<(Recording, Option<String>), RecordingError> {
+    let unreadable = |reason: String| RecordingError::Unreadable { path: path.into(), reason };
+    let bytes = files::read(path).map_err(|error| unreadable(error.to_string()))?;
+    let mut recording = parse(&bytes).map_err(unreadable)?;
+    let joints = recording.joints();
+    let mut manifest = path.as_os_str().to_owned();
+    manifest.push(".manifest.json");
+    let manifest = PathBuf::from(manifest);
+    let found = files::read_text(&manifest).ok().and_then(|text| serde_json::from_str::<Value>(&text).ok());
+    if let Some(meta) =
+        found.and_then(|found| meta(&found["resolved_cgs"])).filter(|m| m.actuators * m.motors_per_actuator == joints)
+    {
+        recording.meta = meta;
+        return Ok((recording, None));
+    }
+    let words = format!(
+        "{} is not there or does not fit: every joint is shown as an actuator, voltages are those of single motors, and no floor is drawn",
+        manifest.display()
+    );
+    Ok((recording, Some(words)))
+}
+
+/// The numbers of a recording from an experiment's [`spec`](crate::experiment::Experiment::spec).
+fn meta(spec: &Value) -> Option<Meta> {
+    let count = |key: &str| spec[key].as_u64().and_then(|count| usize::try_from(count).ok());
+    let ground = (spec["mount"].as_str()? == "ground").then(|| GroundMeta {
+        friction_low: spec["friction"]["low"].as_f64().unwrap_or(f64::NAN),
+        friction_high: spec["friction"]["high"].as_f64().unwrap_or(f64::NAN),
+        period: 0.0,
+        date_time: String::new(),
+    });
+    Some(Meta {
+        time_step: spec["time_step"].as_f64()?,
+        steps: spec["steps"].as_u64()?,
+        record_every: spec["record_every_steps"].as_u64()?,
+        actuators: count("actuators").filter(|n| *n <= MAX_VALUES as usize)?,
+        motors_per_actuator: count("motors_per_actuator").filter(|m| *m <= MAX_VALUES as usize)?,
+        actuator_length: spec["material"]["actuator_length"].as_f64()?,
+        driven_frequency: 1.0,
+        damping_eta: spec["damping_eta"].as_f64().unwrap_or(f64::NAN),
+        ground,
+    })
+}
+
+fn parse(bytes: &[u8]) -> Result<Recording, String> {
+    let mut reader = csv::Reader::from_reader(bytes);
+    let found = reader.headers().map_err(|error| error.to_string())?.clone();
+    let joints = found.len().saturating_sub(5) / 6;
+    let wanted = header(joints);
+    if joints == 0 || found.len() != wanted.len() {
+        return Err(format!("line 1: {} columns are not those of a recording", found.len()));
+    }
+    if let Some((at, (found, wanted))) = found.iter().zip(&wanted).enumerate().find(|(_, (found, wanted))| found != wanted) {
+        return Err(format!("line 1, column {}: {found:?} stands where a recording has {wanted}", at + 1));
+    }
+    let mut recording =
+        Recording { meta: Meta { actuators: joints, motors_per_actuator: 1, ..Meta::default() }, ..Recording::default() };
+    for record in reader.records() {
+        let record = record.map_err(|error| error.to_string())?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let numbers = record
+            .iter()
+            .zip(&wanted)
+            .map(|(text, name)| {
+                let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+                value.ok_or_else(|| format!("line {line}: {name}: {text:?} is not a number"))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        if recording.time.last().is_some_and(|last| numbers[0] <= *last) {
+            return Err(format!("line {line}: t_s is {}, but times must rise", numbers[0]));
+        }
+        recording.time.push(numbers[0]);
+        let (of_joints, of_nodes) = numbers[1..].split_at(4 * joints);
+        let columns = [&mut recording.angles, &mut recording.rates, &mut recording.torques, &mut recording.motor_voltages];
+        for (column, values) in columns.into_iter().zip(of_joints.chunks_exact(joints)) {
+            column.extend(values);
+        }
+        for node in of_nodes.chunks_exact(2) {
+            recording.positions.extend([cm_from_mm(node[0]), f64::NAN, cm_from_mm(node[1])]);
+            recording.velocities.extend([f64::NAN; 3]);
         }
     }
-    for node in 0..nodes {
-        table.write_field(format!("node{node}_x_mm"))?;
-        table.write_field(format!("node{node}_z_mm"))?;
-    }
-    table.write_record(None::<&[u8]>)?;
+    Ok(recording)
+}
+
+fn rows<W: Write>(recording: &Recording, table: &mut csv::Writer<W>) -> csv::Result<()> {
+    let (joints, nodes) = (recording.joints(), recording.nodes());
+    let columns = [&recording.angles, &recording.rates, &recording.torques, &recording.motor_voltages];
+    table.write_record(header(joints))?;
     for (record, time) in recording.time.iter().enumerate() {
         table.write_field(number(*time))?;
-        for (_, _, values) in columns {
+        for values in columns {
             for value in &values[record * joints..(record + 1) * joints] {
                 table.write_field(number(*value))?;
             }
@@ -84,7 +180,30 @@ mod tests {
             reader.headers().unwrap().iter().collect::<Vec<_>>().join(","),
             "t_s,theta1_rad,rate1_rad_s,torque1_dyn_cm,motor_voltage1_v,node0_x_mm,node0_z_mm,node1_x_mm,node1_z_mm,node2_x_mm,node2_z_mm"
         );
+        let back = parse(&out).unwrap();
+        assert_eq!((&back.time, &back.angles, &back.torques), (&recording.time, &recording.angles, &recording.torques));
+        let places: Vec<f64> = (0..3).flat_map(|node| [back.node(0, node)[0], back.node(0, node)[2]]).collect();
+        assert_eq!(places, [0.0, 0.1, 1.0, 0.2, 2.0, 0.3]);
         let row: Vec<f64> = reader.records().next().unwrap().unwrap().iter().map(|f| f.parse().unwrap()).collect();
         assert_eq!(row, [third, third, -1e-300, 1e20, 0.0, 0.0, 1.0, 10.0, 2.0, 20.0, 3.0]);
+    }
+
+    #[test]
+    fn what_is_no_recording_is_refused_with_its_line() {
+        let header = header(1).join(",");
+        for (text, words) in [
+            ("a,b\n1,2\n".to_owned(), "line 1: 2 columns"),
+            (
+                header.replace("rate1_rad_s", "rate1_deg_s"),
+                "line 1, column 3: \"rate1_deg_s\" stands where a recording has rate1_rad_s",
+            ),
+            (format!("{header}\n0,0,0,0,0,0,0,0,0,0,x\n"), "line 2: node2_z_mm: \"x\" is not a number"),
+            (format!("{header}\n0,0,0,0,0,0,0,0,0,0,inf\n"), "line 2: node2_z_mm"),
+            (format!("{header}\n0,0,0\n"), "line: 2"),
+            (format!("{header}\n1,0,0,0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0,0,0,0\n"), "line 3: t_s is 1, but times must rise"),
+        ] {
+            let error = parse(text.as_bytes()).unwrap_err();
+            assert!(error.contains(words), "{text}: {error}");
+        }
     }
 }

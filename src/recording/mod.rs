@@ -3,6 +3,7 @@
 pub mod csv;
 pub mod definitions;
 pub mod measures;
+mod npy;
 pub mod npz;
 pub mod signal;
 
@@ -31,6 +32,9 @@ pub enum RecordingError {
         reason: String,
     },
 }
+
+/// The most numbers that a recording holds (3.2 GB).
+pub(crate) const MAX_VALUES: f64 = 4e8;
 
 /// Numbers that go with a trajectory.
 #[derive(Debug, Clone, PartialEq, Default)]

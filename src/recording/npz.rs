@@ -9,13 +9,14 @@
 use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
 
-use ndarray::{ArrayD, ArrayView, IxDyn, arr0};
-use ndarray_npy::{
-    NpzReader, NpzWriter, ReadNpyError, ReadNpzError, ReadableElement, WritableElement, WriteDataError, WriteNpzError,
-};
+use ndarray::{ArrayView, IxDyn, arr0};
+use ndarray_npy::{NpzWriter, WritableElement, WriteDataError, WriteNpzError};
 use py_literal::Value;
+use zip::ZipArchive;
+use zip::result::ZipError;
 
-use super::{GroundMeta, Meta, Recording, RecordingError};
+use super::npy::{self, Array};
+use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError};
 use crate::words::number;
 
 /// Length of `MM_DD_YYYY_HH_MM`.
@@ -113,43 +114,38 @@ pub fn read(bytes: &[u8], path: &Path) -> Result<Recording, RecordingError> {
 /// As [`read`], and if the file cannot be opened.
 pub fn read_file(path: &Path) -> Result<Recording, RecordingError> {
     let bytes =
-        std::fs::read(path).map_err(|error| RecordingError::Unreadable { path: path.into(), reason: error.to_string() })?;
+        crate::files::read(path).map_err(|error| RecordingError::Unreadable { path: path.into(), reason: error.to_string() })?;
     read(&bytes, path)
 }
 
 /// The archive's arrays, by key.
-struct Arrays<R: Read + Seek>(NpzReader<R>);
+struct Arrays<R: Read + Seek>(ZipArchive<R>);
 
 impl<R: Read + Seek> Arrays<R> {
-    fn array<T: ReadableElement>(&mut self, key: &str) -> Result<ArrayD<T>, String> {
-        self.0
-            .by_name(&format!("{key}.npy"))
-            .or_else(|_| self.0.by_name(key))
-            .map_err(|error| format!("key {key}: {}", plain(&error)))
+    /// An array, whose header and content must agree.
+    fn array(&mut self, key: &str) -> Result<Array, String> {
+        let name = format!("{key}.npy");
+        let name = if self.0.index_for_name(&name).is_some() { name.as_str() } else { key };
+        let bad = |reason: String| format!("key {key}: {reason}");
+        let mut entry = self.0.by_name(name).map_err(|error| bad(plain(&error)))?;
+        npy::read(&mut entry, MAX_VALUES as usize).map_err(bad)
     }
 
     /// The values of a float array of the given shape.
     fn values(&mut self, key: &str, shape: &[usize]) -> Result<Vec<f64>, String> {
-        let array: ArrayD<f64> = self.array(key)?;
-        if array.shape() != shape {
-            return Err(format!("key {key}: the shape is {:?}, but the other keys make it {shape:?}", array.shape()));
+        let array = self.array(key)?;
+        if array.shape != shape {
+            return Err(format!("key {key}: the shape is {:?}, but the other keys make it {shape:?}", array.shape));
         }
-        // Not into_raw_vec: a Fortran-ordered array would come out transposed.
-        Ok(array.iter().copied().collect())
+        Ok(array.values)
     }
 
     /// A scalar, stored as a float or an integer.
     fn number(&mut self, key: &str) -> Result<f64, String> {
-        let single = |shape: &[usize]| -> Result<(), String> {
-            if shape.iter().product::<usize>() == 1 { Ok(()) } else { Err(format!("key {key}: a single number is needed")) }
-        };
-        if let Ok(array) = self.array::<f64>(key) {
-            single(array.shape())?;
-            return Ok(array.iter().copied().next().unwrap_or(f64::NAN));
+        match self.array(key)?.values[..] {
+            [value] => Ok(value),
+            _ => Err(format!("key {key}: a single number is needed")),
         }
-        let array = self.array::<i64>(key)?;
-        single(array.shape())?;
-        Ok(array.iter().next().map_or(f64::NAN, |&value| value as f64))
     }
 
     /// A whole number between `least` and 10⁹.
@@ -163,32 +159,28 @@ impl<R: Read + Seek> Arrays<R> {
     }
 }
 
-/// What the zip and npy readers say, in plain words.
-fn plain(error: &ReadNpzError) -> String {
-    let text = error.to_string();
+/// What the zip reader says, in plain words.
+fn plain(error: &ZipError) -> String {
     match error {
-        ReadNpzError::Npy(ReadNpyError::WrongDescriptor(found)) => {
-            format!("holds numbers of type {found}, which is not the one needed")
-        }
-        ReadNpzError::Zip(_) if text.contains("EOCD") => "there is no zip directory at its end".into(),
-        ReadNpzError::Zip(_) if text.contains("file not found") => "is missing".into(),
-        ReadNpzError::Zip(_) => format!("its zip archive is damaged ({text})"),
-        ReadNpzError::Npy(_) => format!("its array is damaged ({text})"),
+        ZipError::FileNotFound => "is missing".into(),
+        other if other.to_string().contains("EOCD") => "there is no zip directory at its end".into(),
+        other => format!("its zip archive is damaged ({other})"),
     }
 }
 
 fn parse(bytes: &[u8]) -> Result<Recording, String> {
-    let reader =
-        NpzReader::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ file, or cut short: {}", plain(&error)))?;
-    let mut arrays = Arrays(reader);
+    let archive =
+        ZipArchive::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ file, or cut short: {}", plain(&error)))?;
+    let mut arrays = Arrays(archive);
     let actuators = arrays.count("N", 1.0)?;
     let motors_per_actuator = arrays.count("m", 1.0)?;
     let joints = usize::try_from(actuators * motors_per_actuator).map_err(|error| error.to_string())?;
-    let time: ArrayD<f64> = arrays.array("dataTime")?;
-    if time.ndim() != 1 {
-        return Err(format!("key dataTime: the shape is {:?}, but one axis is needed", time.shape()));
+    let Array { shape, values: time } = arrays.array("dataTime")?;
+    let [t] = shape[..] else { return Err(format!("key dataTime: the shape is {shape:?}, but one axis is needed")) };
+    let values = t as f64 * (10.0 * joints as f64 + 13.0);
+    if values > MAX_VALUES {
+        return Err(format!("{t} records of {joints} joints are {values:.1e} numbers, more than {MAX_VALUES:.0e}"));
     }
-    let t = time.len();
     let ground = match (arrays.number("frictionLow"), arrays.number("frictionHigh")) {
         (Ok(friction_low), Ok(friction_high)) => Some(GroundMeta {
             friction_low,
@@ -216,7 +208,7 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
         motor_voltages: arrays.values("dataMotorVoltages", &[t, joints])?,
         positions: arrays.values("dataPositions", &[t, joints + 2, 3])?,
         velocities: arrays.values("dataPositionVelocities", &[t, joints + 2, 3])?,
-        time: time.iter().copied().collect(),
+        time,
     })
 }
 
@@ -298,6 +290,50 @@ mod tests {
         archive.add_array("N", &arr0(1e300)).unwrap();
         let text = said(archive.finish().unwrap().get_ref());
         assert!(text.ends_with("key N: 1e300 is not a whole number from 1 to 1e9"), "{text}");
+    }
+
+    /// An archive with one damaged array: N, m and `dataTime` as given, deflated.
+    fn with_time(npy: &[u8]) -> Vec<u8> {
+        use zip::write::{SimpleFileOptions, ZipWriter};
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        for (key, value) in [("N", 1_i64), ("m", 1)] {
+            let mut bytes = Vec::new();
+            ndarray_npy::WriteNpyExt::write_npy(&arr0(value), &mut bytes).unwrap();
+            archive.start_file(format!("{key}.npy"), SimpleFileOptions::default()).unwrap();
+            archive.write_all(&bytes).unwrap();
+        }
+        archive.start_file("dataTime.npy", SimpleFileOptions::default()).unwrap();
+        archive.write_all(npy).unwrap();
+        archive.finish().unwrap().into_inner()
+    }
+
+    fn npy_of(shape: &str, data: &[u8]) -> Vec<u8> {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+        [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), data].concat()
+    }
+
+    #[test]
+    fn a_header_that_claims_more_than_there_is_is_refused_before_memory_is_taken() {
+        for (shape, data, words) in [
+            ("(1000000000000000,)", 8, "[1000000000000000]"),
+            ("(18446744073709551615, 18446744073709551615)", 8, "more numbers"),
+            ("(99999999999999999999999999,)", 8, "shape"),
+            ("(100000000,)", 16, "cut short"),
+            ("(2,)", 24, "more bytes"),
+        ] {
+            let error = read(&with_time(&npy_of(shape, &vec![0; data])), Path::new("claim.npz")).unwrap_err().to_string();
+            assert!(error.contains("claim.npz") && error.contains("dataTime") && error.contains(words), "{shape}: {error}");
+        }
+    }
+
+    #[test]
+    fn an_entry_that_inflates_without_end_is_cut_off_at_its_header() {
+        // 200 MB of zeros, deflated to 200 kB, behind a header that speaks of two numbers.
+        let bomb = with_time(&npy_of("(2,)", &vec![0; 200_000_000]));
+        assert!(bomb.len() < 1_000_000, "{}", bomb.len());
+        let error = read(&bomb, Path::new("bomb.npz")).unwrap_err().to_string();
+        assert!(error.contains("more bytes"), "{error}");
     }
 
     proptest! {

@@ -278,7 +278,7 @@ impl Bench<'_> {
 
     fn compute(&self, id: &str, sweep: Sweep) -> Result<(Sweep, Vec<Point>), StudyError> {
         let folder = self.folder.join(id);
-        let outcome = sweep::run(&sweep, &folder, (1, 1), self.jobs, self.stop, |_, _| {})?;
+        let outcome = sweep::run(&sweep, &folder, (1, 1), self.jobs, self.stop, |_, _| {}, |_| {})?;
         if outcome.interrupted {
             return Err(StudyError::Interrupted);
         }

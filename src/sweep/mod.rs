@@ -12,18 +12,23 @@
 //!
 //! The runs are those of the planar engine unless the experiment names the other one.
 
+mod identity;
 mod rows;
 mod run;
 
+pub use identity::adopt;
 pub use rows::{Row, RowError, Rows, merge};
 pub use run::{Outcome, run};
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use crate::experiment::{self, ConfigError, Experiment, Source, presets};
+use crate::experiment::{self, ConfigError, Experiment, Setting, Source, line_of, presets};
+use crate::files;
 use crate::recording::definitions;
 use crate::words;
 
@@ -37,6 +42,16 @@ pub struct Axis {
     pub key: String,
     /// Its values, in order.
     pub values: Vec<Value>,
+    /// Where they were given, for messages.
+    pub place: String,
+}
+
+impl Axis {
+    /// Whether a setting of `key` would change the same values, as would one of a table that holds them.
+    fn overlaps(&self, key: &str) -> bool {
+        let inside = |inner: &str, outer: &str| inner.strip_prefix(outer).is_some_and(|rest| rest.starts_with('.'));
+        self.key == key || inside(&self.key, key) || inside(key, &self.key)
+    }
 }
 
 /// A checked sweep.
@@ -48,6 +63,8 @@ pub struct Sweep {
     pub measures: Vec<String>,
     /// What is varied; the last axis runs fastest.
     pub axes: Vec<Axis>,
+    /// The files that the experiments refer to, as they are written there, with a digest of their content.
+    files: BTreeMap<String, String>,
 }
 
 /// The file as written.
@@ -80,21 +97,17 @@ impl Sweep {
     fn with_settings(name: &str, text: &str, folder: &Path, settings: &[String]) -> Result<Self, ConfigError> {
         let file: File = toml::from_str(text)
             .map_err(|error| ConfigError::Syntax { source_name: name.into(), message: words::toml_error(&error) })?;
-        let fault = |key: &str, message: String| ConfigError::Value { place: name.into(), key: key.into(), message };
+        let place = |key: &[&str]| {
+            line_of(text, key.iter().copied()).map_or_else(|| name.to_owned(), |line| format!("{name}, line {line}"))
+        };
+        let fault = |key: &str, message: String| ConfigError::Value { place: place(&[key]), key: key.into(), message };
         let mut source = match file.experiment.strip_prefix("preset:") {
             Some(preset) => {
-                let found = presets::find(preset).ok_or_else(|| fault("experiment", presets::unknown(preset)))?;
-                Source::from_text(found.name, found.text)
+                let text = presets::text_of(preset).ok_or_else(|| fault("experiment", presets::unknown(preset)))?;
+                Source::from_text(preset, text)
             }
             None => Source::from_file(&folder.join(&file.experiment))?,
         };
-        for setting in settings {
-            source.set(setting)?;
-        }
-        // Sweeps are what the fast engine is for.
-        if source.parse()?.simulation.engine.is_none() {
-            source.set("simulation.engine=planar")?;
-        }
         if file.measures.is_empty() {
             return Err(fault("measures", format!("is empty; choose from {}", definitions::names().join(", "))));
         }
@@ -106,38 +119,77 @@ impl Sweep {
                 return Err(fault("measures", format!("{measure} stands there twice")));
             }
         }
-        let axes = file
-            .vary
-            .into_iter()
-            .map(|(key, values)| {
-                let values = axis(&values).map_err(|message| fault(&format!("vary.\"{key}\""), message))?;
-                Ok(Axis { key, values })
-            })
-            .collect::<Result<Vec<_>, ConfigError>>()?;
-        let points = axes.iter().try_fold(1_usize, |points, axis| points.checked_mul(axis.values.len()));
-        if axes.is_empty() || points.is_none_or(|points| points > MAX_POINTS) {
+        let mut axes = Vec::new();
+        for (key, values) in file.vary {
+            let place = place(&["vary", &key]);
+            let values = axis(&values).map_err(|message| ConfigError::Value {
+                place: place.clone(),
+                key: format!("vary.\"{key}\""),
+                message,
+            })?;
+            axes.push(Axis { key, values, place });
+            if points(&axes).is_none() {
+                return Err(fault("vary", format!("must give between 1 and {MAX_POINTS} points")));
+            }
+        }
+        for setting in settings {
+            let setting = Setting::parse(setting)?;
+            match axes.iter_mut().find(|axis| axis.overlaps(&setting.key)) {
+                None => source.push(setting),
+                // A key with one value is not varied: it holds a value for all points, which may be another.
+                Some(axis) if axis.values.len() == 1 && axis.key == setting.key => {
+                    (axis.values, axis.place) = (vec![setting.toml()], setting.place);
+                }
+                Some(axis) => {
+                    let message = format!("the sweep varies {} ({}); change its values there", axis.key, axis.place);
+                    return Err(ConfigError::Value { place: setting.place, key: setting.key, message });
+                }
+            }
+        }
+        // Sweeps are what the fast engine is for.
+        if source.parse()?.simulation.engine.is_none() {
+            source.push(Setting {
+                key: "simulation.engine".into(),
+                value: "planar".into(),
+                place: "the engine of sweeps by default".into(),
+            });
+        }
+        if axes.is_empty() {
             return Err(fault("vary", format!("must give between 1 and {MAX_POINTS} points")));
         }
-        let sweep = Self { source, measures: file.measures, axes };
+        let mut sweep = Self { source, measures: file.measures, axes, files: BTreeMap::new() };
         for index in 0..sweep.len() {
-            experiment::check(&sweep.source_of(index)?)?;
+            let source = sweep.source_of(index)?;
+            for file in experiment::check(&source)?.config.files() {
+                if let Entry::Vacant(entry) = sweep.files.entry(file.display().to_string()) {
+                    let path = source.folder.join(file);
+                    let bytes = files::read(&path).map_err(|error| ConfigError::Data { path, reason: error.to_string() })?;
+                    entry.insert(files::digest(&bytes));
+                }
+            }
         }
         Ok(sweep)
     }
 
-    /// Reads a sweep file, or the built-in one of `preset:NAME`, with settings `KEY=VALUE` of its experiment.
+    /// Reads a sweep file, or a built-in one (`preset:NAME`, or `NAME` where there is no file of that name), with settings `KEY=VALUE`
+    /// of its experiment.
     ///
     /// # Errors
     /// As [`from_text`](Self::from_text), and [`ConfigError::Unreadable`].
     pub fn open(path: &Path, settings: &[String]) -> Result<Self, ConfigError> {
         let name = path.display().to_string();
-        if let Some(preset) = name.strip_prefix("preset:") {
-            let unknown = || ConfigError::Unreadable { path: path.into(), reason: presets::unknown(preset) };
+        let prefixed = name.strip_prefix("preset:");
+        if prefixed.is_some() || !path.exists() {
+            let preset = prefixed.unwrap_or(&name);
+            let unknown = || {
+                let file = if prefixed.is_some() { "" } else { "no such file, and " };
+                ConfigError::Unreadable { path: path.into(), reason: format!("{file}{}", presets::unknown(preset)) }
+            };
             let found = presets::find_sweep(preset).ok_or_else(unknown)?;
             return Self::with_settings(preset, found.text, Path::new(""), settings);
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| ConfigError::Unreadable { path: path.into(), reason: error.to_string() })?;
+        let text =
+            files::read_text(path).map_err(|error| ConfigError::Unreadable { path: path.into(), reason: error.to_string() })?;
         Self::with_settings(&name, &text, path.parent().unwrap_or(Path::new("")), settings)
     }
 
@@ -198,22 +250,14 @@ impl Sweep {
     fn source_of(&self, index: usize) -> Result<Source, ConfigError> {
         let mut source = self.source.clone();
         for (axis, value) in self.axes.iter().zip(self.point(index)) {
-            source.set(&format!("{}={value}", axis.key))?;
+            let place = if axis.place.starts_with("--set") {
+                axis.place.clone()
+            } else {
+                format!("{}, {} = {value}", axis.place, axis.key)
+            };
+            source.push(Setting { key: axis.key.clone(), value: value.to_string(), place });
         }
         Ok(source)
-    }
-
-    /// Everything that decides the results: two sweeps with the same text give the same rows.
-    pub fn identity(&self) -> serde_json::Value {
-        let axes: Vec<_> = self.axes.iter().map(|axis| serde_json::json!({"key": axis.key, "values": axis.values})).collect();
-        serde_json::json!({
-            "schema": 1,
-            "version": env!("CARGO_PKG_VERSION"),
-            "experiment": self.source.text(),
-            "settings": self.source.settings(),
-            "measures": self.measures,
-            "vary": axes,
-        })
     }
 
     /// The header of the results.
@@ -221,6 +265,12 @@ impl Sweep {
         let keys = self.axes.iter().map(|axis| axis.key.as_str());
         keys.chain(self.measures.iter().map(String::as_str)).chain(["status"]).collect()
     }
+}
+
+/// Number of points of a grid; `None` if there are too many.
+fn points(axes: &[Axis]) -> Option<usize> {
+    let points = axes.iter().try_fold(1_usize, |points, axis| points.checked_mul(axis.values.len()));
+    points.filter(|points| *points <= MAX_POINTS)
 }
 
 /// A list of values, or a range of evenly spaced ones whose ends are exact.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::Sweep;
-use crate::files::Pending;
+use crate::files::{self, Pending};
 
 /// One finished point.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +35,16 @@ pub enum RowError {
         path: PathBuf,
         /// What does not fit.
         reason: String,
+    },
+    /// Another program computed the rows: another revision, or with another Bullet.
+    #[error("{}: its rows were computed by {theirs}, and this is {ours}; go on with that program, or choose another --out", path.display())]
+    OtherProgram {
+        /// The file that says so.
+        path: PathBuf,
+        /// Who computed them.
+        theirs: String,
+        /// This program.
+        ours: String,
     },
     /// A file could not be read or written; finished rows stay as they are.
     #[error("{}: {reason}", path.display())]
@@ -70,27 +80,45 @@ pub struct Rows {
     path: PathBuf,
     file: File,
     done: BTreeMap<usize, Row>,
+    unlocked: Option<String>,
 }
 
 impl Rows {
     /// Opens the rows of shard `shard` (from 1) of `shards` in `folder`, which is made if need be, and checks that the folder is this
-    /// sweep's. The file is locked until the rows are dropped.
+    /// sweep's. The file is locked until the rows are dropped, where the file system can do that.
     ///
     /// # Errors
     /// [`RowError`].
     pub fn open(folder: &Path, sweep: &Sweep, shard: usize, shards: usize) -> Result<Self, RowError> {
+        Self::open_with(folder, sweep, shard, shards, File::try_lock)
+    }
+
+    fn open_with(
+        folder: &Path,
+        sweep: &Sweep,
+        shard: usize,
+        shards: usize,
+        lock: impl Fn(&File) -> Result<(), TryLockError>,
+    ) -> Result<Self, RowError> {
         std::fs::create_dir_all(folder).map_err(io(folder))?;
-        claim(folder, sweep)?;
+        sweep.claim(folder)?;
         let path = folder.join(format!("rows-{shard}-of-{shards}.csv"));
+        if path.metadata().is_ok_and(|there| !there.is_file()) {
+            return Err(RowError::Io { path, reason: "is not a regular file".into() });
+        }
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(&path).map_err(io(&path))?;
-        match file.try_lock() {
-            Ok(()) => {}
+        let unlocked = match lock(&file) {
+            Ok(()) => None,
             Err(TryLockError::WouldBlock) => {
                 let reason = "another sfers is working on it; wait for it, or give every process a shard of its own".into();
                 return Err(RowError::Io { path, reason });
             }
+            Err(TryLockError::Error(error)) if files::cannot_lock(&error) => Some(format!(
+                "{}: this file system cannot lock files ({error}): two processes must not work on the same shard",
+                path.display()
+            )),
             Err(TryLockError::Error(error)) => return Err(io(&path)(error)),
-        }
+        };
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(io(&path))?;
         let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
@@ -99,7 +127,12 @@ impl Rows {
             file.seek(SeekFrom::End(0)).map_err(io(&path))?;
         }
         let done = parse(&path, &bytes[..whole], sweep)?;
-        Ok(Self { path, file, done })
+        Ok(Self { path, file, done, unlocked })
+    }
+
+    /// A warning if the file system cannot keep other processes from the same rows.
+    pub fn unlocked(&self) -> Option<&str> {
+        self.unlocked.as_deref()
     }
 
     /// The rows that are there.
@@ -129,27 +162,13 @@ impl Rows {
     }
 }
 
-/// Leaves the sweep's identity in the folder, or checks that it is there already.
-fn claim(folder: &Path, sweep: &Sweep) -> Result<(), RowError> {
-    let path = folder.join("sweep.json");
-    let identity = format!("{:#}\n", sweep.identity());
-    match std::fs::read_to_string(&path) {
-        Ok(found) if found == identity => return Ok(()),
-        Ok(_) => {
-            let reason = "holds the results of another sweep (or of another version of the program); choose another --out, or \
-                          remove the folder"
-                .into();
-            return Err(RowError::Foreign { path, reason });
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(io(&path)(error)),
-    }
-    // Two shards may start together: whoever comes second finds the same text.
-    replace(&path, identity.as_bytes())
-}
-
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), RowError> {
     Pending::open(path).and_then(|pending| pending.finish(bytes)).map_err(io(path))
+}
+
+/// A value as a cell: words without the quotes that TOML needs.
+fn plain(value: &toml::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row>, RowError> {
@@ -179,7 +198,7 @@ fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row
 /// # Errors
 /// [`RowError::Incomplete`] if a point is in no shard; nothing is written then.
 pub fn merge(folder: &Path, sweep: &Sweep) -> Result<PathBuf, RowError> {
-    claim(folder, sweep)?;
+    sweep.claim(folder)?;
     let mut all = BTreeMap::new();
     for entry in std::fs::read_dir(folder).map_err(io(folder))? {
         let path = entry.map_err(io(folder))?.path();
@@ -205,11 +224,51 @@ pub fn merge(folder: &Path, sweep: &Sweep) -> Result<PathBuf, RowError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(sweep.header()).map_err(io_of_csv)?;
     for row in all.values() {
-        let values = sweep.point(row.index).into_iter().map(ToString::to_string);
+        let values = sweep.point(row.index).into_iter().map(plain);
         let measures = row.measures.iter().map(|m| m.map_or_else(String::new, |m| format!("{m:?}")));
         writer.write_record(values.chain(measures).chain([row.status.clone()])).map_err(io_of_csv)?;
     }
     let bytes = writer.into_inner().map_err(|error| RowError::Io { path: path.clone(), reason: error.to_string() })?;
     replace(&path, &bytes)?;
     Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Error;
+
+    use super::*;
+
+    const TEXT: &str = "experiment = \"preset:cantilever-dc\"\nmeasures = [\"tip_deflection_mm\"]\n[vary]\n\
+        \"simulation.engine\" = [\"planar\", \"bullet\"]\n";
+
+    /// ENOTSUP, ENOLCK and ENOSYS of Linux, as Lustre without flock and old network file systems return them.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_system_that_cannot_lock_is_warned_of_and_the_rows_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let sweep = Sweep::from_text("s.toml", TEXT, Path::new("")).unwrap();
+        for code in [95, 37, 38] {
+            let lock = |_: &File| Err(TryLockError::Error(Error::from_raw_os_error(code)));
+            let mut rows = Rows::open_with(folder.path(), &sweep, 1, 1, lock).unwrap();
+            assert!(rows.unlocked().unwrap().contains("cannot lock"), "{code}");
+            rows.append(Row { index: 0, measures: vec![Some(1.5)], status: "ok".into() }).unwrap();
+        }
+        let failing = |_: &File| Err(TryLockError::Error(Error::from_raw_os_error(5)));
+        assert!(Rows::open_with(folder.path(), &sweep, 1, 1, failing).is_err(), "an input/output error is no lack of locks");
+        let rows = Rows::open(folder.path(), &sweep, 1, 1).unwrap();
+        assert_eq!((rows.unlocked(), rows.done()[&0].measures[0]), (None, Some(1.5)));
+    }
+
+    #[test]
+    fn words_are_cells_without_quotes() {
+        let folder = tempfile::tempdir().unwrap();
+        let sweep = Sweep::from_text("s.toml", TEXT, Path::new("")).unwrap();
+        let mut rows = Rows::open(folder.path(), &sweep, 1, 1).unwrap();
+        for index in 0..2 {
+            rows.append(Row { index, measures: vec![None], status: "ok".into() }).unwrap();
+        }
+        let text = std::fs::read_to_string(merge(folder.path(), &sweep).unwrap()).unwrap();
+        assert_eq!(text, "simulation.engine,tip_deflection_mm,status\nplanar,,ok\nbullet,,ok\n");
+    }
 }

@@ -25,7 +25,7 @@ pub struct Outcome {
 
 /// Computes the missing points of shard `shard` (from 1) of `shards`, on `jobs` threads. Every row is on disk before the next begins on
 /// that thread. `progress` is called with the number of points done and of all points of the shard; when `stop` turns true, points in
-/// work are given up.
+/// work are given up. `warn` gets what the user should know before the work begins.
 ///
 /// # Errors
 /// [`RowError`] if the rows cannot be read or written. A point that fails is a row.
@@ -36,8 +36,10 @@ pub fn run(
     jobs: usize,
     stop: &AtomicBool,
     progress: impl Fn(usize, usize) + Sync,
+    warn: impl Fn(&str),
 ) -> Result<Outcome, RowError> {
     let rows = Rows::open(folder, sweep, shard, shards)?;
+    rows.unlocked().into_iter().for_each(warn);
     let mine: Vec<usize> = (0..sweep.len()).filter(|index| index % shards == shard - 1).collect();
     let todo: Vec<usize> = mine.iter().copied().filter(|index| !rows.done().contains_key(index)).collect();
     let before = mine.len() - todo.len();

@@ -8,7 +8,7 @@ use crate::recording::Recording;
 
 /// Frames that a page holds at most.
 const FRAMES: usize = 2000;
-/// Speeds that the page offers.
+/// Speeds that the page offers, beside one that was wished for.
 const SPEEDS: [f64; 8] = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0];
 /// How long a recording should take to play (s), to choose the speed it begins with.
 const WATCH: f64 = 8.0;
@@ -38,13 +38,13 @@ pub fn player(title: &str, recording: &Recording, speed: Option<f64>) -> String 
         })
         .collect();
     let duration = recording.time.last().copied().unwrap_or(0.0);
-    let wanted = speed.unwrap_or(duration / WATCH);
+    let wanted = duration / WATCH;
     let nearest = SPEEDS.into_iter().min_by(|a, b| (a / wanted).ln().abs().total_cmp(&(b / wanted).ln().abs())).unwrap_or(1.0);
     let data = json!({
         "actuators": recording.meta.actuators,
         "m": recording.meta.motors_per_actuator,
         "ground": on_ground(recording),
-        "speed": nearest,
+        "speed": speed.unwrap_or(nearest),
         "time": records().map(|r| round(recording.time[r], 1e7)).collect::<Vec<_>>(),
         "nodes": nodes,
         "volts": records().map(|r| voltages(recording, r).into_iter().map(|v| round(v, 10.0)).collect::<Vec<_>>()).collect::<Vec<_>>(),

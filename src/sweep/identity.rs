@@ -1,0 +1,144 @@
+//! Whose rows a folder holds: what decides the results, in `sweep.json` beside them.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::{RowError, Sweep};
+use crate::files::Pending;
+
+/// The program that computes: results may change with its revision, and with Bullet's.
+const PROGRAM: &str = concat!(
+    "sfers ",
+    env!("CARGO_PKG_VERSION"),
+    ", revision ",
+    env!("SFERS_GIT_REVISION"),
+    ", Bullet ",
+    env!("SFERS_BULLET_VERSION"),
+    " ",
+    env!("SFERS_BULLET_PRECISION")
+);
+
+/// The key of the list of programs, which alone may grow.
+const PROGRAMS: &str = "programs";
+
+impl Sweep {
+    /// Everything that decides the results: two sweeps with the same identity give the same rows.
+    pub fn identity(&self) -> Value {
+        let axes: Vec<_> = self.axes.iter().map(|axis| json!({"key": axis.key, "values": axis.values})).collect();
+        let settings: Vec<_> = self.source.settings().iter().map(|setting| json!([setting.key, setting.value])).collect();
+        json!({
+            "schema": 2,
+            PROGRAMS: [PROGRAM],
+            "experiment": self.source.text(),
+            "settings": settings,
+            "measures": self.measures,
+            "vary": axes,
+            "files": self.files,
+        })
+    }
+
+    /// Leaves the identity in the folder, or checks that it is there already.
+    ///
+    /// # Errors
+    /// [`RowError::Foreign`] with what differs; [`RowError::OtherProgram`] if only the program does.
+    pub(super) fn claim(&self, folder: &Path) -> Result<(), RowError> {
+        let path = path(folder);
+        let Some(found) = read(&path)? else {
+            // Two shards may start together: whoever comes second writes the same text.
+            return write(&path, &self.identity());
+        };
+        self.compare(&path, &found)?;
+        let programs = found[PROGRAMS].as_array().cloned().unwrap_or_default();
+        if programs.iter().any(|program| program == PROGRAM) {
+            return Ok(());
+        }
+        let theirs: Vec<_> = programs.iter().map(|program| program.as_str().unwrap_or_default()).collect();
+        Err(RowError::OtherProgram { path, theirs: theirs.join(" and "), ours: PROGRAM.into() })
+    }
+
+    /// Checks all but the program.
+    fn compare(&self, path: &Path, found: &Value) -> Result<(), RowError> {
+        let differences = differences(found, &self.identity());
+        if differences.is_empty() {
+            return Ok(());
+        }
+        let reason = format!(
+            "holds the results of another sweep: {} differ; choose another --out, or remove the folder",
+            differences.join(", ")
+        );
+        Err(RowError::Foreign { path: path.into(), reason })
+    }
+}
+
+/// Adds this program to those whose rows the folder may hold, so that a sweep begun by another revision goes on.
+///
+/// # Errors
+/// [`RowError`] if the folder holds another sweep's rows, or its identity cannot be written.
+pub fn adopt(folder: &Path, sweep: &Sweep) -> Result<(), RowError> {
+    let path = path(folder);
+    let Some(mut found) = read(&path)? else { return Ok(()) };
+    sweep.compare(&path, &found)?;
+    match found[PROGRAMS].as_array_mut() {
+        Some(programs) if !programs.iter().any(|program| program == PROGRAM) => programs.push(PROGRAM.into()),
+        _ => return Ok(()),
+    }
+    write(&path, &found)
+}
+
+fn path(folder: &Path) -> PathBuf {
+    folder.join("sweep.json")
+}
+
+fn read(path: &Path) -> Result<Option<Value>, RowError> {
+    match crate::files::read_text(path) {
+        Ok(text) => serde_json::from_str(&text).map(Some).map_err(|error| RowError::Foreign {
+            path: path.into(),
+            reason: format!("is not the identity of a sweep ({error}); choose another --out, or remove the folder"),
+        }),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(RowError::Io { path: path.into(), reason: error.to_string() }),
+    }
+}
+
+fn write(path: &Path, identity: &Value) -> Result<(), RowError> {
+    let text = format!("{identity:#}\n");
+    Pending::open(path)
+        .and_then(|pending| pending.finish(text.as_bytes()))
+        .map_err(|error| RowError::Io { path: path.into(), reason: error.to_string() })
+}
+
+/// What differs between two identities but the programs, in words.
+fn differences(found: &Value, ours: &Value) -> Vec<String> {
+    if found["schema"] != ours["schema"] {
+        return vec!["their layouts (it was begun by another version of the program)".into()];
+    }
+    let mut list = Vec::new();
+    for (key, words) in [("experiment", "the experiment files"), ("settings", "the settings"), ("measures", "the measures")] {
+        if found[key] != ours[key] {
+            list.push(words.to_owned());
+        }
+    }
+    let axes = |identity: &Value| -> Vec<(String, Value)> {
+        let axes = identity["vary"].as_array().cloned().unwrap_or_default();
+        axes.into_iter().map(|axis| (axis["key"].as_str().unwrap_or_default().to_owned(), axis["values"].clone())).collect()
+    };
+    let files = |identity: &Value| -> Vec<(String, Value)> {
+        let files = identity["files"].as_object().cloned().unwrap_or_default();
+        files.into_iter().collect()
+    };
+    list.extend(unequal(&axes(found), &axes(ours)).into_iter().map(|key| format!("the values of {key}")));
+    list.extend(unequal(&files(found), &files(ours)).into_iter().map(|name| format!("the contents of {name}")));
+    if list.is_empty() && found["vary"] != ours["vary"] {
+        list.push("the orders of the varied keys".into());
+    }
+    list
+}
+
+/// Names that only one of two lists has, or both with other values.
+fn unequal(a: &[(String, Value)], b: &[(String, Value)]) -> Vec<String> {
+    let names = a.iter().chain(b.iter().filter(|(name, _)| !a.iter().any(|(other, _)| other == name))).map(|(name, _)| name);
+    let value =
+        |list: &[(String, Value)], name: &str| list.iter().find(|(other, _)| other == name).map(|(_, value)| value.clone());
+    names.filter(|name| value(a, name) != value(b, name)).cloned().collect()
+}
