@@ -1,409 +1,546 @@
-//! One pair of axes with lines and points, as SVG.
+//! Figures for print: panels with lines and points on shared axes, as SVG.
+//!
+//! Nothing stands on the data: the legend is above the axes, labels at the ends of lines are beside them. A legend tells at most five
+//! series apart, by dash and marker as well as by colour; a panel with more has labels at the ends of its series.
 
-use std::fmt::Write;
+use super::axis::Scale;
+use super::canvas::{Anchor, Area, Canvas, HATCH, Size};
+use super::heatmap::{Categories, Cells, Key};
+use super::panel::{LINE, Lane, Panel};
+use super::series::{Look, Mark, STYLES, Series, Style};
+use super::text::{shorten, width, wrap};
 
-/// Size of a figure (px).
-const WIDTH: f64 = 640.0;
-const HEIGHT: f64 = 400.0;
-/// Room for labels around the axes: left, right, top, bottom (px).
-const MARGINS: [f64; 4] = [64.0, 18.0, 34.0, 50.0];
-/// Okabe and Ito's palette, safe for the colour-blind, in an order that alternates dark and light.
-const COLOURS: [&str; 7] = ["#000000", "#d55e00", "#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#e69f00"];
-/// Dashes tell lines apart in grey.
-const DASHES: [&str; 7] = ["", "7 3", "2 2.5", "9 3 2 3", "14 3", "5 2 1 2 1 2", "3 5"];
-
-/// How a series is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
-    /// A line.
-    Line,
-    /// Points.
-    Points,
-    /// A line with its points.
-    Both,
-}
-
-#[derive(Debug, Clone)]
-struct Series {
-    label: String,
-    points: Vec<(f64, f64)>,
-    mark: Mark,
-    colour: String,
-    dash: &'static str,
-    width: f64,
-}
+/// Room at the edges of the page (pt).
+const EDGE: f64 = 3.0;
+/// Length of a sample in a legend (pt).
+const SAMPLE: f64 = 22.0;
+/// Height of a panel as a share of its width, where nothing else decides.
+const SHARE: f64 = 0.62;
+/// Shapes are drawn this much higher than true at most.
+const MOST_ENLARGED: f64 = 10.0;
 
 /// A figure that is being made.
 ///
+/// A figure begins with one panel; [`panel`](Self::panel) puts another below it, on the same x axis, and
+/// [`small_multiple`](Self::small_multiple) begins one of a grid of panels that share both axes. What is added goes to the latest panel.
+///
 /// # Examples
 /// ```
-/// use sfers::view::{Figure, Mark};
+/// use sfers::view::{Figure, Mark, Size};
 /// let mut figure = Figure::new("A parabola", "time (s)", "height (mm)");
 /// figure.series("y = t²", (0..10).map(|t| (f64::from(t), f64::from(t * t))), Mark::Both);
+/// figure.setting("thrown upwards at 3 m/s").from_zero().size(Size::SINGLE);
 /// assert!(figure.svg().starts_with("<svg"));
 /// ```
 #[derive(Debug, Clone)]
 pub struct Figure {
     title: String,
+    setting: String,
     x_label: String,
-    y_label: String,
-    series: Vec<Series>,
-    notes: Vec<(f64, f64, String)>,
-    horizontals: Vec<f64>,
-    equal_aspect: bool,
-    y_ticks: bool,
+    x_texts: Vec<String>,
+    size: Size,
+    panels: Vec<Panel>,
+    key: Option<Key>,
+    multiples: bool,
 }
 
 impl Figure {
-    /// An empty figure; labels carry their units.
+    /// An empty figure of the size [`Size::SCREEN`]; labels carry their units.
     pub fn new(title: &str, x_label: &str, y_label: &str) -> Self {
         Self {
             title: title.into(),
+            setting: String::new(),
             x_label: x_label.into(),
-            y_label: y_label.into(),
-            series: Vec::new(),
-            notes: Vec::new(),
-            horizontals: Vec::new(),
-            equal_aspect: false,
-            y_ticks: true,
+            x_texts: Vec::new(),
+            size: Size::SCREEN,
+            panels: vec![Panel::new(y_label, SHARE)],
+            key: None,
+            multiples: false,
         }
     }
 
-    /// Adds a series in the next colour and dash; points that are not finite break a line. An empty label stays out of the legend.
+    /// Replaces the title.
+    pub fn title(&mut self, title: &str) -> &mut Self {
+        self.title = title.into();
+        self
+    }
+
+    /// A line below the title: what was simulated or measured, and under which settings.
+    pub fn setting(&mut self, setting: &str) -> &mut Self {
+        self.setting = setting.into();
+        self
+    }
+
+    /// Physical size of the figure and its letters.
+    pub fn size(&mut self, size: Size) -> &mut Self {
+        self.size = size;
+        self
+    }
+
+    /// Begins another panel below, on the same x axis. Neighbours with equal labels share one.
+    pub fn panel(&mut self, y_label: &str) -> &mut Self {
+        self.panels.push(Panel::new(y_label, 0.5 * SHARE));
+        self
+    }
+
+    /// Begins a panel of a grid, with a title of its own; all panels of the grid share both axes and the legend. The first call names
+    /// the panel that the figure begins with.
+    pub fn small_multiple(&mut self, title: &str) -> &mut Self {
+        if self.multiples {
+            let label = self.last().y_label.clone();
+            self.panels.push(Panel::new(&label, 0.8));
+        }
+        self.multiples = true;
+        let panel = self.last();
+        panel.title = title.into();
+        panel.share = 0.8;
+        self
+    }
+
+    /// A title of the panel alone, over its upper left corner.
+    pub fn panel_title(&mut self, title: &str) -> &mut Self {
+        self.last().title = title.into();
+        self
+    }
+
+    /// Height of the panel as a share of its width (ignored where both axes have the same scale).
+    pub fn share(&mut self, share: f64) -> &mut Self {
+        self.last().share = share;
+        self
+    }
+
+    /// Adds a series in the next of five styles; points that are not finite break a line. An empty label stays out of the legend.
+    /// Series of the same label in several panels have the same style.
     pub fn series(&mut self, label: &str, points: impl IntoIterator<Item = (f64, f64)>, mark: Mark) -> &mut Self {
-        let next = self.series.len() % COLOURS.len();
-        let points = points.into_iter().collect();
-        self.series.push(Series {
-            label: label.into(),
-            points,
-            mark,
-            colour: COLOURS[next].into(),
-            dash: DASHES[next],
-            width: 1.8,
-        });
-        self
+        self.add(label, points, mark, Look::Styled)
     }
 
-    /// Adds a solid line of a colour of its own.
+    /// Adds a solid line of a colour and width (pt) of its own.
     pub fn line(&mut self, label: &str, points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f64) -> &mut Self {
+        self.add(label, points, Mark::Line, Look::Plain { colour: colour.into(), width })
+    }
+
+    /// Adds a robot's shape as a thick line that stands on its points: z of a recording is the height of the robot's lower face.
+    pub fn robot(&mut self, label: &str, points: impl IntoIterator<Item = (f64, f64)>, colour: &str) -> &mut Self {
+        self.add(label, points, Mark::Line, Look::Robot { colour: colour.into() })
+    }
+
+    fn add(&mut self, label: &str, points: impl IntoIterator<Item = (f64, f64)>, mark: Mark, look: Look) -> &mut Self {
         let points = points.into_iter().collect();
-        self.series.push(Series { label: label.into(), points, mark: Mark::Line, colour: colour.into(), dash: "", width });
+        self.last().series.push(Series { label: label.into(), points, mark, look });
         self
     }
 
-    /// Writes a text at a point.
+    /// Adds a strip for one signal; the strips of a panel stand below one another and share one scale. `name` stands to the left,
+    /// `remark`, such as the values that it takes, to the right.
+    pub fn strip(&mut self, name: &str, remark: &str, points: impl IntoIterator<Item = (f64, f64)>) -> &mut Self {
+        let points = points.into_iter().collect();
+        self.last().lanes.push(Lane { name: name.into(), remark: remark.into(), points });
+        self
+    }
+
+    /// Makes the panel a map of `values`, row after row from the bottom, with a colour bar; missing ones are hatched. Maps of one figure
+    /// share the scale of colours.
+    pub fn map(&mut self, x: &Categories, y: &Categories, values: &[Option<f64>], label: &str) -> &mut Self {
+        let cells = |key: Key| Cells { x: x.clone(), y: y.clone(), values: values.to_vec(), key };
+        self.last().cells = Some(cells(Key::over(label, values)));
+        let all: Vec<_> = self.panels.iter().filter_map(|p| p.cells.as_ref()).flat_map(|c| c.values.iter().copied()).collect();
+        let key = Key::over(label, &all);
+        self.panels.iter_mut().filter_map(|p| p.cells.as_mut()).for_each(|cells| cells.key = key.clone());
+        self.key = Some(key);
+        self
+    }
+
+    /// Writes these texts at 0, 1, 2 … of the x axis instead of numbers; none leaves the numbers.
+    pub fn x_texts(&mut self, texts: &[String]) -> &mut Self {
+        self.x_texts = texts.to_vec();
+        self
+    }
+
+    /// Writes a text at a point, shifted where it would stand on another one or outside the axes.
     pub fn note(&mut self, x: f64, y: f64, text: &str) -> &mut Self {
-        self.notes.push((x, y, text.into()));
+        self.last().notes.push((x, y, text.into()));
         self
     }
 
-    /// Draws a grey line across at a height, such as the floor.
+    /// Draws a grey line across at a height.
     pub fn horizontal(&mut self, y: f64) -> &mut Self {
-        self.horizontals.push(y);
+        self.last().horizontals.push(y);
         self
     }
 
-    /// Gives both axes the same scale.
+    /// Draws the floor at 0, hatched below; the axis begins there.
+    pub fn floor(&mut self) -> &mut Self {
+        self.last().floor = true;
+        self
+    }
+
+    /// Lets the y axis begin at 0, as for heights, shares and amplitudes.
+    pub fn from_zero(&mut self) -> &mut Self {
+        self.last().from_zero = true;
+        self
+    }
+
+    /// Writes the labels beside the ends of the series instead of in a legend.
+    pub fn end_labels(&mut self) -> &mut Self {
+        self.last().end_labels = true;
+        self
+    }
+
+    /// Gives both axes of the panel the same scale.
     pub fn equal_aspect(&mut self) -> &mut Self {
-        self.equal_aspect = true;
+        self.last().equal_aspect = true;
+        self
+    }
+
+    /// As [`equal_aspect`](Self::equal_aspect), but a panel that would be flat is drawn some whole number of times higher than true,
+    /// which the figure says below its title. Neighbouring panels of one label share their scale.
+    pub fn filled_aspect(&mut self) -> &mut Self {
+        self.last().equal_aspect = true;
+        self.last().enlarged = true;
         self
     }
 
     /// Leaves the numbers of the y axis away, for curves that are drawn one above the other.
     pub fn without_y_numbers(&mut self) -> &mut Self {
-        self.y_ticks = false;
+        self.last().y_numbers = false;
         self
     }
 
-    /// The figure as an SVG document.
+    fn last(&mut self) -> &mut Panel {
+        if self.panels.is_empty() {
+            self.panels.push(Panel::new("", SHARE));
+        }
+        let last = self.panels.len() - 1;
+        &mut self.panels[last]
+    }
+
+    /// The figure as an SVG document with its physical size.
     pub fn svg(&self) -> String {
-        let all = || self.series.iter().flat_map(|s| &s.points).copied().filter(|p| shown(*p));
-        let mut x = Scale::over(all().map(|p| p.0));
-        let notes = self.notes.iter().filter(|note| shown((note.0, note.1))).map(|note| note.1);
-        let mut y = Scale::over(all().map(|p| p.1).chain(self.horizontals.iter().copied()).chain(notes));
-        let [left, mut right, top, bottom] = MARGINS;
-        let mut height = HEIGHT;
-        if self.equal_aspect {
-            // Such figures are flat: the legend stands beside them.
-            right += if self.legend_size().0 > 0.0 { self.legend_size().0 + 10.0 } else { 0.0 };
-            // The width is given and the height follows, within reason.
-            let width = WIDTH - left - right;
-            let wanted = (y.high - y.low) / (x.high - x.low) * width;
-            let inner = wanted.clamp(self.legend_size().1.max(90.0), 520.0);
-            height = inner + top + bottom;
-            if wanted < inner {
-                y.widen((x.high - x.low) * inner / width);
-            } else {
-                x.widen((y.high - y.low) * width / inner);
+        Layout::of(self).draw()
+    }
+
+    /// Columns of the grid: as many as leave every panel a readable width.
+    fn columns(&self) -> usize {
+        let most = ((self.size.width() - 6.0 * self.size.font_pt) / (11.0 * self.size.font_pt)) as usize;
+        if self.multiples { self.panels.len().min(most.clamp(1, 4)) } else { 1 }
+    }
+
+    /// Labels of the legend that all panels share; none if there are too many for one.
+    fn shared_labels(&self) -> Vec<String> {
+        let mut labels: Vec<String> = Vec::new();
+        for series in self.panels.iter().filter(|p| !p.ends_are_labelled()).flat_map(Panel::labelled) {
+            if !labels.contains(&series.label) {
+                labels.push(series.label.clone());
             }
         }
-        x.place(left, WIDTH - right);
-        y.place(height - bottom, top);
-        let mut out = String::new();
-        open(&mut out, WIDTH, height, &self.title);
-        self.axes(&mut out, &x, &y, [left, top, WIDTH - right, height - bottom]);
-        let _ = writeln!(
-            out,
-            r#"<clipPath id="box"><rect x="{left}" y="{top}" width="{}" height="{}"/></clipPath><g clip-path="url(#box)">"#,
-            WIDTH - left - right,
-            height - top - bottom
-        );
-        for &at in &self.horizontals {
-            let at = y.at(at);
-            let _ = writeln!(
-                out,
-                r##"<line x1="{left}" x2="{}" y1="{at:.2}" y2="{at:.2}" stroke="#888" stroke-width="1.2"/>"##,
-                WIDTH - right
-            );
-        }
-        for (index, series) in self.series.iter().enumerate() {
-            series.draw(&mut out, &x, &y, index);
-        }
-        out.push_str("</g>\n");
-        for (at_x, at_y, text) in &self.notes {
-            let _ =
-                writeln!(out, r#"<text x="{:.1}" y="{:.1}" font-size="11">{}</text>"#, x.at(*at_x), y.at(*at_y), escape(text));
-        }
-        self.legend(&mut out, &x, &y, [left, top, WIDTH - right, height - bottom]);
-        out.push_str("</svg>\n");
-        out
+        if labels.len() > STYLES { Vec::new() } else { labels }
     }
+}
 
-    fn axes(&self, out: &mut String, x: &Scale, y: &Scale, [left, top, x1, y1]: [f64; 4]) {
-        let (x_ticks, x_digits) = x.ticks(9);
-        for tick in x_ticks {
-            let at = x.at(tick);
-            let _ = writeln!(out, r##"<line x1="{at:.2}" x2="{at:.2}" y1="{top}" y2="{y1}" stroke="#e4e4e4"/>"##);
-            let _ =
-                writeln!(out, r#"<text x="{at:.2}" y="{:.1}" text-anchor="middle">{}</text>"#, y1 + 16.0, number(tick, x_digits));
-        }
-        let (y_ticks, y_digits) = y.ticks(if y1 - top < 140.0 { 4 } else { 7 });
-        for tick in y_ticks.into_iter().filter(|_| self.y_ticks) {
-            let at = y.at(tick);
-            let _ = writeln!(out, r##"<line x1="{left}" x2="{x1}" y1="{at:.2}" y2="{at:.2}" stroke="#e4e4e4"/>"##);
-            let _ = writeln!(
-                out,
-                r#"<text x="{:.1}" y="{:.2}" text-anchor="end">{}</text>"#,
-                left - 7.0,
-                at + 4.0,
-                number(tick, y_digits)
-            );
-        }
-        frame(out, [left, top, x1, y1], &self.x_label, &self.y_label);
-    }
+/// Where everything of a figure goes.
+struct Layout<'a> {
+    figure: &'a Figure,
+    size: f64,
+    width: f64,
+    columns: usize,
+    /// Labels of a legend that all panels share.
+    labels: Vec<String>,
+    styles: Vec<Vec<Style>>,
+    x: Scale,
+    y: Vec<Scale>,
+    left: f64,
+    room: f64,
+    heights: Vec<f64>,
+    /// How much higher than true shapes are drawn.
+    enlarged: f64,
+}
 
-    /// Width and height of the legend (px), zero without labels.
-    fn legend_size(&self) -> (f64, f64) {
-        let labels = || self.series.iter().filter(|s| !s.label.is_empty()).map(|s| s.label.chars().count());
-        labels().max().map_or((0.0, 0.0), |longest| (46.0 + 6.8 * longest as f64, 8.0 + 16.0 * labels().count() as f64))
-    }
-
-    /// A box with the labels, in the corner where it hides the fewest points.
-    fn legend(&self, out: &mut String, x: &Scale, y: &Scale, [left, top, right, bottom]: [f64; 4]) {
-        let labelled: Vec<&Series> = self.series.iter().filter(|s| !s.label.is_empty()).collect();
-        let (width, height) = self.legend_size();
-        if labelled.is_empty() {
-            return;
-        }
-        let hidden = |corner: &(f64, f64)| {
-            let inside = |(px, py): (f64, f64)| {
-                (corner.0 - 4.0..corner.0 + width + 4.0).contains(&px) && (corner.1 - 4.0..corner.1 + height + 4.0).contains(&py)
-            };
-            // Lines count by points every few pixels along them.
-            self.series
+impl<'a> Layout<'a> {
+    fn of(figure: &'a Figure) -> Self {
+        let (size, width) = (figure.size.font_pt, figure.size.width());
+        let labels = figure.shared_labels();
+        let styles = figure.panels.iter().map(|panel| panel.styles(&labels)).collect();
+        let flat = figure.panels.iter().any(|p| p.cells.is_some() || !p.lanes.is_empty() || p.equal_aspect);
+        let margin = if figure.panels.iter().any(|p| p.cells.is_some()) {
+            0.0
+        } else if flat {
+            0.02
+        } else {
+            0.04
+        };
+        let x = Scale::over(figure.panels.iter().flat_map(Panel::x_values), margin);
+        let own = |panel: &Panel| panel.y_scale(panel.y_values());
+        let y = match figure.panels.first().filter(|_| figure.multiples) {
+            Some(first) => vec![first.y_scale(figure.panels.iter().flat_map(Panel::y_values)); figure.panels.len()],
+            None => figure
+                .panels
                 .iter()
-                .flat_map(|s| s.points.windows(2))
-                .flat_map(|w| (0..8).map(move |k| (w[0], w[1], f64::from(k) / 8.0)))
-                .filter(|(a, b, t)| inside((x.at(a.0 + t * (b.0 - a.0)), y.at(a.1 + t * (b.1 - a.1)))))
-                .count()
+                .map(|panel| {
+                    let alike = |other: &&Panel| other.enlarged && other.y_label == panel.y_label;
+                    match panel.enlarged {
+                        true => panel.y_scale(figure.panels.iter().filter(alike).flat_map(Panel::y_values)),
+                        false => own(panel),
+                    }
+                })
+                .collect(),
         };
-        let pad = 7.0;
-        let (far, low) = (right - pad - width, bottom - pad - height);
-        let beside = [(right + 10.0, top)];
-        let inside = [(far, top + pad), (left + pad, top + pad), (far, low), (left + pad, low), ((left + far) / 2.0, top + pad)];
-        let corners: &[_] = if self.equal_aspect { &beside } else { &inside };
-        let Some(&(at_x, at_y)) = corners.iter().min_by_key(|corner| hidden(corner)) else { return };
-        let _ = writeln!(
-            out,
-            r##"<rect x="{at_x:.1}" y="{at_y:.1}" width="{width:.1}" height="{height:.1}" fill="#fff" fill-opacity="0.85" stroke="#ccc"/>"##
-        );
-        for (i, series) in labelled.iter().enumerate() {
-            let middle = at_y + 12.0 + 16.0 * i as f64;
-            let index = self.series.iter().position(|s| std::ptr::eq(s, *series)).unwrap_or(0);
-            series.sample(out, at_x + 6.0, middle, index);
-            let _ = writeln!(out, r#"<text x="{:.1}" y="{:.1}">{}</text>"#, at_x + 38.0, middle + 4.0, escape(&series.label));
+        let room = figure.panels.iter().map(|p| p.right_room(size, 0.45 * width)).fold(0.0, f64::max);
+        let columns = figure.columns();
+        let mut layout = Self {
+            figure,
+            size,
+            width,
+            columns,
+            labels,
+            styles,
+            x,
+            y,
+            left: 3.0 * size,
+            room,
+            heights: Vec::new(),
+            enlarged: 1.0,
+        };
+        // The room for numbers at the left depends on the heights of the panels, and these on their width.
+        for _ in 0..3 {
+            layout.measure();
         }
-    }
-}
-
-/// Whether a point can be drawn at all.
-fn shown((x, y): (f64, f64)) -> bool {
-    x.abs() < 1e100 && y.abs() < 1e100
-}
-
-impl Series {
-    fn stroke(&self) -> String {
-        format!(
-            r#"fill="none" stroke="{}" stroke-width="{}" stroke-linejoin="round" stroke-dasharray="{}""#,
-            self.colour, self.width, self.dash
-        )
+        layout
     }
 
-    fn draw(&self, out: &mut String, x: &Scale, y: &Scale, index: usize) {
-        if self.mark != Mark::Points {
-            for part in self.points.split(|p| !shown(*p)).filter(|part| part.len() > 1) {
-                let points: Vec<String> = part.iter().map(|p| format!("{:.2},{:.2}", x.at(p.0), y.at(p.1))).collect();
-                let _ = writeln!(out, r#"<polyline points="{}" {}/>"#, points.join(" "), self.stroke());
+    fn right(&self) -> f64 {
+        self.width - EDGE - self.room.max(1.6 * self.size)
+    }
+
+    fn panel_width(&self) -> f64 {
+        let gaps = self.size * (self.columns - 1) as f64;
+        ((self.right() - self.left - gaps) / self.columns as f64).max(20.0)
+    }
+
+    /// Heights of the panels and the left margin.
+    fn measure(&mut self) {
+        let across = self.panel_width();
+        let figure = self.figure;
+        self.heights.clear();
+        for (panel, y) in figure.panels.iter().zip(&mut self.y) {
+            let mut height = panel.share * across;
+            if panel.equal_aspect {
+                // Until the axes have places, a range is that of the data.
+                let wanted = y.range() / self.x.range() * across;
+                height = wanted.clamp(3.0 * self.size, 1.2 * across);
+                if wanted < height && panel.enlarged {
+                    let times = (height / wanted).ceil().min(MOST_ENLARGED);
+                    height = wanted * times;
+                    self.enlarged = times;
+                } else if wanted < height {
+                    y.widen(self.x.range() * height / across, panel.floor || panel.from_zero);
+                } else if wanted > 1.001 * height {
+                    self.x.widen(y.range() * across / height, false);
+                }
+            }
+            if !panel.lanes.is_empty() {
+                height = 0.0;
+            }
+            self.heights.push(height.max(panel.least_height(self.size)));
+        }
+        let texts = figure.panels.iter().zip(&self.y).zip(&self.heights);
+        let widest = texts.flat_map(|((panel, y), height)| panel.y_ticks(y, *height, self.size));
+        let widest = widest.map(|(_, text)| width(&text, self.size)).fold(0.0, f64::max).min(0.35 * self.width);
+        let lines = self.y_labels().iter().map(|(_, _, lines)| lines.len()).max().unwrap_or(0);
+        let left = EDGE + lines as f64 * LINE * self.size + 3.0 + widest + 3.0;
+        self.left = left.max(self.left.min(left + 0.1)).max(1.6 * self.size);
+    }
+
+    fn rows(&self) -> usize {
+        self.figure.panels.len().div_ceil(self.columns)
+    }
+
+    fn row_height(&self, row: usize) -> f64 {
+        self.heights.iter().skip(row * self.columns).take(self.columns).copied().fold(0.0, f64::max)
+    }
+
+    /// What stands above the axes of a row: titles of panels, a legend of its own.
+    fn head(&self, row: usize) -> f64 {
+        let panels = || row * self.columns..((row + 1) * self.columns).min(self.figure.panels.len());
+        let title = panels().any(|i| !self.figure.panels[i].title.is_empty());
+        let legend = panels().map(|i| self.legend_rows(&self.own_legend(i)).1.len()).max().unwrap_or(0);
+        f64::from(u8::from(title)) * LINE * self.size + legend as f64 * LINE * self.size
+    }
+
+    /// Room between a row and the next (pt).
+    fn gap(&self, row: usize) -> f64 {
+        let floor = self.figure.panels.get(row * self.columns).is_some_and(|p| p.floor);
+        self.size + if floor { HATCH } else { 0.0 }
+    }
+
+    /// First row, number of rows and lines of each label of the y axis.
+    fn y_labels(&self) -> Vec<(usize, usize, Vec<String>)> {
+        let label = |row: usize| self.figure.panels.get(row * self.columns).map_or("", |p| p.y_label.as_str());
+        let mut groups: Vec<(usize, usize, Vec<String>)> = Vec::new();
+        for row in 0..self.rows() {
+            match groups.last_mut() {
+                Some((first, count, _)) if label(*first) == label(row) => *count += 1,
+                _ => groups.push((row, 1, Vec::new())),
             }
         }
-        if self.mark != Mark::Line {
-            for p in self.points.iter().filter(|p| shown(**p)) {
-                self.marker(out, x.at(p.0), y.at(p.1), index);
-            }
+        for (first, count, lines) in &mut groups {
+            let rows = *first..*first + *count;
+            let extent: f64 =
+                rows.map(|row| self.row_height(row) + if row > *first { self.gap(row) + self.head(row) } else { 0.0 }).sum();
+            *lines = wrap(label(*first), self.size, extent.max(5.0 * self.size));
         }
+        groups
     }
 
-    fn sample(&self, out: &mut String, left: f64, middle: f64, index: usize) {
-        if self.mark != Mark::Points {
-            let _ = writeln!(
-                out,
-                r#"<line x1="{left:.1}" x2="{:.1}" y1="{middle:.1}" y2="{middle:.1}" {}/>"#,
-                left + 26.0,
-                self.stroke()
+    /// Series that a legend shows over one panel alone.
+    fn own_legend(&self, index: usize) -> Vec<(&'a Series, Style)> {
+        let panel = &self.figure.panels[index];
+        if !self.labels.is_empty() || panel.ends_are_labelled() {
+            return Vec::new();
+        }
+        panel.series.iter().zip(&self.styles[index]).filter(|(s, _)| !s.label.is_empty()).map(|(s, t)| (s, t.clone())).collect()
+    }
+
+    fn shared_legend(&self) -> Vec<(&'a Series, Style)> {
+        let find = |label: &String| {
+            self.figure.panels.iter().zip(&self.styles).filter(|(p, _)| !p.ends_are_labelled()).find_map(|(panel, styles)| {
+                panel.series.iter().zip(styles).find(|(s, _)| s.label == *label).map(|(s, t)| (s, t.clone()))
+            })
+        };
+        self.labels.iter().filter_map(find).collect()
+    }
+
+    /// The entries in columns of one width, as many as fit: their texts, by rows.
+    fn legend_rows(&self, entries: &[(&'a Series, Style)]) -> (f64, Vec<Vec<(&'a Series, Style, String)>>) {
+        let most = self.width - 2.0 * EDGE;
+        let texts: Vec<_> = entries.iter().map(|(s, _)| shorten(&s.label, self.size, most - SAMPLE - 4.0)).collect();
+        let widest = texts.iter().map(|text| width(text, self.size)).fold(0.0, f64::max);
+        let column = SAMPLE + 4.0 + widest + 1.2 * self.size;
+        let columns = (((most + 1.2 * self.size) / column) as usize).clamp(1, entries.len().max(1));
+        // The same number in each row, as far as that goes.
+        let columns = entries.len().div_ceil(entries.len().div_ceil(columns).max(1)).max(1);
+        let entries: Vec<_> = entries.iter().zip(texts).map(|((series, style), text)| (*series, style.clone(), text)).collect();
+        (column, entries.chunks(columns).map(<[_]>::to_vec).collect())
+    }
+
+    fn draw_legend(&self, canvas: &mut Canvas, entries: &[(&'a Series, Style)], mut top: f64) -> f64 {
+        let (column, rows) = self.legend_rows(entries);
+        let Some(first) = rows.first() else { return top };
+        // Centred over the axes as far as the page allows.
+        let across = first.len() as f64 * column - 1.2 * self.size;
+        let middle = (self.left + self.right()) / 2.0;
+        let begin = (middle - across / 2.0).min(self.width - EDGE - across).max(EDGE);
+        canvas.out.push_str("<g class=\"legend\">\n");
+        for row in rows {
+            for (i, (series, style, text)) in row.into_iter().enumerate() {
+                let (x, y) = (begin + i as f64 * column, top + 0.5 * LINE * self.size);
+                series.sample(&mut canvas.out, &style, x, y, SAMPLE);
+                canvas.text(x + SAMPLE + 4.0, y, self.size, Anchor::Start, &text);
+            }
+            top += LINE * self.size;
+        }
+        canvas.out.push_str("</g>\n");
+        top + 0.3 * self.size
+    }
+
+    fn draw(mut self) -> String {
+        let (size, figure) = (self.size, self.figure);
+        let mut canvas = Canvas::default();
+        let mut top = EDGE;
+        let most = self.width - 2.0 * EDGE;
+        let enlarged = format!("heights drawn {} times larger than lengths", self.enlarged);
+        let below = [figure.setting.as_str(), if self.enlarged > 1.0 { &enlarged } else { "" }];
+        let below = below.into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ");
+        for (text, size) in [(&figure.title, 1.15 * size), (&below, size)] {
+            for line in wrap(text, size, most) {
+                canvas.text(self.width / 2.0, top + 0.5 * LINE * size, size, Anchor::Middle, &line);
+                top += LINE * size;
+            }
+        }
+        top += 0.4 * size;
+        top = self.draw_legend(&mut canvas, &self.shared_legend(), top);
+        if let Some(key) = &figure.key {
+            top = key.draw(&mut canvas, self.left, self.right(), top, size) + 0.3 * size;
+        }
+        let mut bottom = top;
+        let mut extents = Vec::new();
+        for row in 0..self.rows() {
+            if row > 0 {
+                top += self.gap(row - 1);
+            }
+            top += self.head(row);
+            extents.push(top);
+            for column in 0..self.columns {
+                let index = row * self.columns + column;
+                if index < figure.panels.len() {
+                    bottom = bottom.max(self.draw_panel(&mut canvas, index, top));
+                }
+            }
+            top += self.row_height(row);
+        }
+        for (first, count, lines) in self.y_labels() {
+            let end = first + count - 1;
+            let middle = (extents[first] + extents[end] + self.row_height(end)) / 2.0;
+            for (i, line) in lines.iter().enumerate() {
+                canvas.upright(EDGE + (i as f64 + 0.5) * LINE * size, middle, size, line);
+            }
+        }
+        let label = wrap(&figure.x_label, size, most);
+        for line in label {
+            let middle = (self.left + self.right()) / 2.0;
+            let half = width(&line, size) / 2.0;
+            let middle = middle.min(self.width - EDGE - half).max(EDGE + half);
+            canvas.text(middle, bottom + 0.5 * LINE * size, size, Anchor::Middle, &line);
+            bottom += LINE * size;
+        }
+        canvas.document(figure.size, bottom + EDGE, &figure.title)
+    }
+
+    /// Draws one panel with its heading and numbers; gives where it ends.
+    fn draw_panel(&mut self, canvas: &mut Canvas, index: usize, top: f64) -> f64 {
+        let (size, panel) = (self.size, &self.figure.panels[index]);
+        let (row, column) = (index / self.columns, index % self.columns);
+        let across = self.panel_width();
+        let left = self.left + column as f64 * (across + size);
+        let area = Area { left, top, right: left + across, bottom: top + self.heights[index] };
+        let mut above = top - self.head(row);
+        above = self.draw_legend(canvas, &self.own_legend(index), above).max(above);
+        if !panel.title.is_empty() {
+            let text = shorten(&panel.title, size, across + 0.8 * size);
+            canvas.text(
+                (area.left + area.right) / 2.0,
+                above.min(top - LINE * size) + 0.5 * LINE * size,
+                size,
+                Anchor::Middle,
+                &text,
             );
         }
-        if self.mark != Mark::Line {
-            self.marker(out, left + 13.0, middle, index);
+        let (mut x, mut y) = (self.x, self.y[index]);
+        x.place(area.left, area.right);
+        let lanes = panel.lanes.len() as f64;
+        if lanes > 0.0 {
+            (y.low, y.high) = (0.0, lanes);
         }
-    }
-
-    /// Circle, square, triangle or diamond, by turns.
-    fn marker(&self, out: &mut String, x: f64, y: f64, index: usize) {
-        let c = &self.colour;
-        let _ = match index % 4 {
-            0 => writeln!(out, r#"<circle cx="{x:.2}" cy="{y:.2}" r="3" fill="{c}"/>"#),
-            1 => writeln!(
-                out,
-                r##"<rect x="{:.2}" y="{:.2}" width="6" height="6" fill="#fff" stroke="{c}" stroke-width="1.6"/>"##,
-                x - 3.0,
-                y - 3.0
-            ),
-            2 => writeln!(out, r#"<path d="M{:.2} {:.2}h7l-3.5 -6.5z" fill="{c}"/>"#, x - 3.5, y + 3.0),
-            _ => writeln!(
-                out,
-                r##"<path d="M{x:.2} {:.2}l4 4l-4 4l-4 -4z" fill="#fff" stroke="{c}" stroke-width="1.6"/>"##,
-                y - 4.0
-            ),
-        };
-    }
-}
-
-/// Begins a document and writes its title.
-pub(super) fn open(out: &mut String, width: f64, height: f64, title: &str) {
-    let _ = writeln!(
-        out,
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:.0}" font-family="Helvetica, Arial, sans-serif" font-size="12" fill="#111">
-<rect width="{width}" height="{height:.0}" fill="#fff"/>
-<text x="{}" y="21" font-size="14" text-anchor="middle">{}</text>"##,
-        width / 2.0,
-        escape(title)
-    );
-}
-
-/// The box of the axes with its labels.
-pub(super) fn frame(out: &mut String, [left, top, right, bottom]: [f64; 4], x_label: &str, y_label: &str) {
-    let _ = writeln!(
-        out,
-        r##"<rect x="{left}" y="{top}" width="{:.1}" height="{:.1}" fill="none" stroke="#111"/>
-<text x="{:.1}" y="{:.1}" text-anchor="middle" font-size="13">{}</text>
-<text transform="translate(17 {:.1}) rotate(-90)" text-anchor="middle" font-size="13">{}</text>"##,
-        right - left,
-        bottom - top,
-        (left + right) / 2.0,
-        bottom + 37.0,
-        escape(x_label),
-        (top + bottom) / 2.0,
-        escape(y_label)
-    );
-}
-
-/// One axis: a range of values laid over a range of pixels.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Scale {
-    low: f64,
-    high: f64,
-    from: f64,
-    to: f64,
-}
-
-impl Scale {
-    /// The range of the values, widened by a little, or around a single one.
-    fn over(values: impl Iterator<Item = f64>) -> Self {
-        let (mut low, mut high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        if low > high {
-            (low, high) = (0.0, 1.0);
+        y.place(area.bottom, area.top);
+        canvas.out.push_str("<g class=\"panel\">\n");
+        panel.draw(canvas, &x, &y, area, &self.styles[index], size, self.room, &self.figure.x_texts);
+        if column == 0 || !self.figure.multiples {
+            for (at, text) in panel.y_ticks(&y, area.height(), size) {
+                let text = shorten(&text, size, 0.35 * self.width);
+                canvas.text(area.left - 3.0, y.at(at), size, Anchor::End, &text);
+            }
         }
-        let (spread, size) = (high - low, high.abs().max(low.abs()));
-        let pad = if spread > 1e-9 * size.max(1e-80) { 0.04 * spread } else { 0.5 * size.max(1e-9) };
-        Self { low: low - pad, high: high + pad, from: 0.0, to: 1.0 }
-    }
-
-    /// Widens to `range`, about its middle.
-    fn widen(&mut self, range: f64) {
-        let middle = 0.5 * (self.low + self.high);
-        (self.low, self.high) = (middle - 0.5 * range, middle + 0.5 * range);
-    }
-
-    fn place(&mut self, from: f64, to: f64) {
-        (self.from, self.to) = (from, to);
-    }
-
-    fn at(&self, value: f64) -> f64 {
-        self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
-    }
-
-    /// About `count` round values, and the digits after the point that they need.
-    fn ticks(&self, count: usize) -> (Vec<f64>, usize) {
-        ticks(self.low, self.high, count)
-    }
-}
-
-/// Multiples of 1, 2 or 5 times a power of ten within a range, at most `count` of them, and the digits after the point that they need.
-pub(super) fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
-    let rough = (high - low) / count as f64;
-    let power = rough.log10().floor();
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * 10f64.powf(power)).find(|step| *step >= rough * (1.0 - 1e-9));
-    let step = step.unwrap_or(rough);
-    let digits = (-(step * (1.0 + 1e-9)).log10().floor()).max(0.0) as usize;
-    let first = (low / step - 1e-9).ceil() as i64;
-    let last = (high / step + 1e-9).floor() as i64;
-    ((first..=last).map(|i| i as f64 * step).collect(), digits)
-}
-
-/// A number with a true minus sign.
-pub(super) fn number(value: f64, digits: usize) -> String {
-    if digits > 6 || value.abs() >= 1e7 {
-        return format!("{value:.1e}").replace('-', "−");
-    }
-    let text = format!("{value:.digits$}");
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
-}
-
-/// Text as it may stand in XML. Control characters, which XML does not allow, are left out.
-pub(crate) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c if c.is_control() => {}
-            c => out.push(c),
+        let mut bottom = area.bottom + if panel.floor { HATCH + 1.0 } else { 0.0 };
+        // Numbers of the x axis stand below the lowest panel of each column.
+        if index + self.columns >= self.figure.panels.len() {
+            for (at, text) in panel.x_ticks(&x, across, size, &self.figure.x_texts) {
+                canvas.text(x.at(at), bottom + 2.0 + 0.6 * size, size, Anchor::Middle, &text);
+            }
+            bottom += 2.0 + 1.35 * size;
         }
+        canvas.out.push_str("</g>\n");
+        bottom
     }
-    out
 }
 
 #[cfg(test)]
@@ -411,23 +548,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    #[test]
-    fn ticks_are_round_and_inside() {
-        assert_eq!(ticks(-0.4, 10.4, 6), (vec![0.0, 2.0, 4.0, 6.0, 8.0, 10.0], 0));
-        let (values, digits) = ticks(0.0031, 0.0099, 8);
-        assert_eq!(digits, 3);
-        assert!(values.iter().zip([0.004, 0.005, 0.006, 0.007, 0.008, 0.009]).all(|(a, b)| (a - b).abs() < 1e-12));
-        assert_eq!(number(-0.0, 2), "0.00");
-        assert_eq!(number(-1.5, 1), "−1.5");
-    }
-
     proptest! {
         #[test]
         fn any_figure_is_well_formed(title in ".{0,20}", points in prop::collection::vec((-1e9..1e9_f64, prop::num::f64::ANY), 0..20)) {
             let mut figure = Figure::new(&title, "x (mm)", &title);
-            figure.series(&title, points.clone(), Mark::Both).series("", points, Mark::Line).note(0.0, 0.0, &title).horizontal(0.0);
+            figure.series(&title, points.clone(), Mark::Both).series("", points.clone(), Mark::Line).note(0.0, 0.0, &title).horizontal(0.0);
+            figure.strip("a", &title, points);
             let plain = figure.svg();
-            figure.equal_aspect();
+            figure.equal_aspect().floor().panel(&title).strip(&title, "", [(0.0, 1.0)]);
             for svg in [plain, figure.svg()] {
                 prop_assert!(roxmltree::Document::parse(&svg).is_ok());
                 prop_assert!(!svg.contains("NaN") && !svg.contains("inf"));

@@ -1,8 +1,11 @@
-//! A value over two others, as SVG.
+//! A value over two others as coloured cells, and the colour bar.
 
 use std::fmt::Write;
 
-use super::figure::{escape, frame, number, open, ticks};
+use super::axis::{Scale, ticks};
+use super::canvas::{Anchor, Area, Canvas, Size};
+use super::figure::Figure;
+use super::text::{number, width};
 
 /// Colours of equal steps in lightness from dark to light, so that they stay in order in grey (after viridis).
 const COLOURS: [[f64; 3]; 6] = [
@@ -13,6 +16,8 @@ const COLOURS: [[f64; 3]; 6] = [
     [122.0, 209.0, 81.0],
     [253.0, 231.0, 37.0],
 ];
+/// Steps of a colour bar.
+const STEPS: usize = 64;
 
 /// A colour of the scale, at a share from 0 to 1.
 pub fn colour(share: f64) -> String {
@@ -34,71 +39,138 @@ pub struct Categories {
     pub texts: Vec<String>,
 }
 
-/// Draws `values`, row after row from the bottom; missing ones are hatched.
-pub fn heat_map(title: &str, label: &str, x: &Categories, y: &Categories, values: &[Option<f64>]) -> String {
-    let (left, top, right, bottom) = (76.0, 34.0, 540.0, 350.0);
-    let (columns, rows) = (x.texts.len().max(1), y.texts.len().max(1));
-    let known = || values.iter().flatten().copied().filter(|v| v.is_finite());
-    let (mut low, mut high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    if low > high {
-        (low, high) = (0.0, 1.0);
+/// A scale of colours with its label, which holds the unit.
+#[derive(Debug, Clone)]
+pub(super) struct Key {
+    pub label: String,
+    pub low: f64,
+    pub high: f64,
+    /// Whether values are missing, which are hatched.
+    pub missing: bool,
+}
+
+impl Key {
+    /// Over all values that are there.
+    pub fn over(label: &str, values: &[Option<f64>]) -> Self {
+        let known = values.iter().flatten().copied().filter(|v| v.is_finite());
+        let (mut low, mut high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        if low > high {
+            (low, high) = (0.0, 1.0);
+        }
+        if low == high {
+            (low, high) = (low - 0.5 * low.abs().max(1e-9), high + 0.5 * high.abs().max(1e-9));
+        }
+        let missing = values.iter().any(|v| v.is_none_or(|v| !v.is_finite()));
+        Self { label: label.into(), low, high, missing }
     }
-    if low == high {
-        (low, high) = (low - 0.5 * low.abs().max(1e-9), high + 0.5 * high.abs().max(1e-9));
+
+    pub fn share(&self, value: f64) -> f64 {
+        (value - self.low) / (self.high - self.low)
     }
-    let mut out = String::new();
-    open(&mut out, 640.0, 400.0, title);
-    out.push_str(
-        r##"<pattern id="none" width="6" height="6" patternUnits="userSpaceOnUse"><path d="M0 6L6 0" stroke="#999"/></pattern>"##,
-    );
-    let (cell_x, cell_y) = ((right - left) / columns as f64, (bottom - top) / rows as f64);
-    for row in 0..rows {
-        for column in 0..columns {
-            let value = values.get(row * columns + column).copied().flatten().filter(|v| v.is_finite());
-            let fill = value.map_or_else(|| "url(#none)".into(), |v| colour((v - low) / (high - low)));
-            // A hair wider than the cell, so that no seams show.
-            let _ = writeln!(
-                out,
-                r#"<rect x="{:.2}" y="{:.2}" width="{:.2}" height="{:.2}" fill="{fill}"/>"#,
-                left + column as f64 * cell_x,
-                bottom - (row + 1) as f64 * cell_y,
-                cell_x + 0.3,
-                cell_y + 0.3
+
+    /// Label, bar and numbers below one another, from `top` on; gives where they end.
+    pub fn draw(&self, canvas: &mut Canvas, left: f64, right: f64, top: f64, size: f64) -> f64 {
+        canvas.out.push_str("<g class=\"key\">\n");
+        canvas.text((left + right) / 2.0, top + 0.6 * size, size, Anchor::Middle, &self.label);
+        let bar = Area { left, top: top + 1.35 * size, right, bottom: top + 2.25 * size };
+        for step in 0..STEPS {
+            let share = step as f64 / STEPS as f64;
+            let from = bar.left + share * bar.width();
+            rectangle(
+                &mut canvas.out,
+                from,
+                bar.top,
+                bar.right - from,
+                bar.height(),
+                &colour((step as f64 + 0.5) / STEPS as f64),
             );
         }
+        canvas.frame(bar);
+        let mut x = Scale::over([self.low, self.high].into_iter(), 0.0);
+        x.place(bar.left, bar.right);
+        for count in (1..=7).rev() {
+            let (values, digits) = ticks(self.low, self.high, count);
+            let texts: Vec<_> = values.iter().map(|v| (x.at(*v), number(*v, digits))).collect();
+            let apart = |w: &[(f64, String)]| w[1].0 - w[0].0 > 0.5 * (width(&w[0].1, size) + width(&w[1].1, size)) + 0.8 * size;
+            if count == 1 || texts.windows(2).all(apart) {
+                for (at, text) in texts {
+                    canvas.line((at, bar.bottom), (at, bar.bottom + 2.0), "#111", 0.5);
+                    canvas.text(at, bar.bottom + 2.0 + 0.6 * size, size, Anchor::Middle, &text);
+                }
+                break;
+            }
+        }
+        let mut end = bar.bottom + 2.0 + 1.3 * size;
+        if self.missing {
+            let box_ = Area { left, top: end, right: left + 1.6 * size, bottom: end + size };
+            hatch(&mut canvas.out, box_);
+            canvas.frame(box_);
+            canvas.text(box_.right + 3.0, end + 0.5 * size, size, Anchor::Start, "no value");
+            end += 1.4 * size;
+        }
+        canvas.out.push_str("</g>\n");
+        end
     }
-    for (i, text) in x.texts.iter().enumerate().step_by(columns.div_ceil(10)) {
-        let at = left + (i as f64 + 0.5) * cell_x;
-        let _ = writeln!(out, r#"<text x="{at:.1}" y="{:.1}" text-anchor="middle">{}</text>"#, bottom + 16.0, escape(text));
+}
+
+fn rectangle(out: &mut String, x: f64, y: f64, width: f64, height: f64, fill: &str) {
+    let _ = writeln!(out, r#"<rect x="{x:.3}" y="{y:.3}" width="{width:.3}" height="{height:.3}" fill="{fill}"/>"#);
+}
+
+/// Hatching across a white cell.
+fn hatch(out: &mut String, area: Area) {
+    rectangle(out, area.left, area.top, area.width(), area.height(), "#fff");
+    let (width, height) = (area.width(), area.height());
+    let mut path = String::new();
+    let mut along = 3.0;
+    // Lines x + y = along, from one edge of the cell to another.
+    while along < width + height {
+        let (x0, y0) = (f64::min(along, width), f64::max(along - width, 0.0));
+        let (x1, y1) = (f64::max(along - height, 0.0), f64::min(along, height));
+        let _ = write!(path, "M{:.2} {:.2}L{:.2} {:.2}", area.left + x0, area.top + y0, area.left + x1, area.top + y1);
+        along += 4.0;
     }
-    for (i, text) in y.texts.iter().enumerate().step_by(rows.div_ceil(12)) {
-        let at = bottom - (i as f64 + 0.5) * cell_y;
-        let _ = writeln!(out, r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"#, left - 7.0, at + 4.0, escape(text));
+    let _ = writeln!(out, r##"<path class="missing" d="{path}" fill="none" stroke="#888" stroke-width="0.5"/>"##);
+}
+
+/// Values over two axes, row after row from the bottom; missing ones are hatched.
+#[derive(Debug, Clone)]
+pub(super) struct Cells {
+    pub x: Categories,
+    pub y: Categories,
+    pub values: Vec<Option<f64>>,
+    pub key: Key,
+}
+
+impl Cells {
+    pub fn draw(&self, out: &mut String, area: Area) {
+        let (columns, rows) = (self.x.texts.len().max(1), self.y.texts.len().max(1));
+        let (wide, high) = (area.width() / columns as f64, area.height() / rows as f64);
+        let value =
+            |row: usize, column: usize| self.values.get(row * columns + column).copied().flatten().filter(|v| v.is_finite());
+        out.push_str("<g class=\"cells\">\n");
+        // Each cell reaches under its right and lower neighbours, which are painted later, so that no seams show.
+        for row in (0..rows).rev() {
+            let top = area.bottom - (row + 1) as f64 * high;
+            for column in 0..columns {
+                let left = area.left + column as f64 * wide;
+                if let Some(v) = value(row, column) {
+                    let (right, bottom) = ((left + 1.5 * wide).min(area.right), (top + 1.5 * high).min(area.bottom));
+                    rectangle(out, left, top, right - left, bottom - top, &colour(self.key.share(v)));
+                } else {
+                    hatch(out, Area { left, top, right: left + wide, bottom: top + high });
+                }
+            }
+        }
+        out.push_str("</g>\n");
     }
-    for i in 0..64 {
-        let share = f64::from(i) / 64.0;
-        let y = bottom - (share + 1.0 / 64.0) * (bottom - top);
-        let _ = writeln!(
-            out,
-            r#"<rect x="556" y="{y:.2}" width="18" height="{:.2}" fill="{}"/>"#,
-            (bottom - top) / 64.0 + 0.3,
-            colour(share)
-        );
-    }
-    let (bar, digits) = ticks(low, high, 7);
-    for tick in bar {
-        let at = bottom - (tick - low) / (high - low) * (bottom - top);
-        let _ = writeln!(out, r#"<text x="580" y="{:.1}">{}</text>"#, at + 4.0, number(tick, digits));
-    }
-    let _ = writeln!(
-        out,
-        r#"<text transform="translate(633 {}) rotate(-90)" text-anchor="middle" font-size="13">{}</text>"#,
-        (top + bottom) / 2.0,
-        escape(label)
-    );
-    frame(&mut out, [left, top, right, bottom], &x.label, &y.label);
-    out.push_str("</svg>\n");
-    out
+}
+
+/// Draws `values`, row after row from the bottom; missing ones are hatched.
+pub fn heat_map(title: &str, label: &str, x: &Categories, y: &Categories, values: &[Option<f64>]) -> String {
+    let mut figure = Figure::new(title, &x.label, &y.label);
+    figure.map(x, y, values, label);
+    figure.size(Size::SCREEN).svg()
 }
 
 #[cfg(test)]
@@ -110,9 +182,11 @@ mod tests {
         let axis = |label: &str, n: usize| Categories { label: label.into(), texts: (0..n).map(|i| i.to_string()).collect() };
         let svg = heat_map("t", "v (mm)", &axis("x (s)", 2), &axis("y <", 2), &[Some(0.0), Some(1.0), None, Some(f64::NAN)]);
         let document = roxmltree::Document::parse(&svg).unwrap();
-        let fills: Vec<_> = document.descendants().filter_map(|node| node.attribute("fill")).collect();
-        assert_eq!(fills.iter().filter(|fill| **fill == "url(#none)").count(), 2);
+        let cells = document.descendants().find(|node| node.attribute("class") == Some("cells")).unwrap();
+        let fills: Vec<_> = cells.descendants().filter_map(|node| node.attribute("fill")).collect();
+        assert_eq!(cells.descendants().filter(|node| node.attribute("class") == Some("missing")).count(), 2);
         assert!(fills.contains(&"#440154") && fills.contains(&"#fde725"));
+        assert!(document.descendants().any(|node| node.text() == Some("no value")));
     }
 
     #[test]

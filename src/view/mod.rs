@@ -1,16 +1,23 @@
-//! Pictures: figures as SVG, animations as HTML and GIF.
+//! Pictures: figures as SVG, PNG and PDF, animations as HTML and GIF.
 
+mod axis;
+mod canvas;
 mod figure;
 mod gif;
 mod heatmap;
+mod panel;
 mod player;
 mod recordings;
 mod results;
+mod series;
+mod text;
 
-pub(crate) use figure::escape;
-pub use figure::{Figure, Mark};
+pub use canvas::Size;
+pub use figure::Figure;
 pub use gif::gif;
 pub use heatmap::{Categories, colour, heat_map};
 pub use player::player;
 pub use recordings::{Kind, amplitudes, shape, shapes, spectrum, traces};
-pub use results::{ResultsError, label_of, results};
+pub use results::{ResultsError, View, figure_of_results, label_of, results};
+pub use series::Mark;
+pub(crate) use text::escape;

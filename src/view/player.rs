@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::figure::escape;
+use super::text::escape;
 use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
 

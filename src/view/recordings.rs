@@ -1,7 +1,9 @@
 //! Figures of one recording.
 
-use super::figure::{Figure, Mark};
-use super::heatmap::colour;
+use super::figure::Figure;
+use super::player::voltages;
+use super::series::Mark;
+use super::text::{number, significant};
 use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
 
@@ -16,8 +18,8 @@ pub enum Kind {
     Spectrum,
 }
 
-/// Shapes drawn over one another at most.
-const SHAPES: usize = 8;
+/// Shapes drawn below one another at most.
+const SHAPES: usize = 6;
 
 impl Kind {
     /// Draws the figure.
@@ -35,17 +37,18 @@ impl Kind {
     }
 }
 
-/// Shapes of some records over one another, darker ones earlier, with the floor for robots that lie on one.
+/// Shapes of some records below one another, each with its time, over the floor for robots that lie on one.
 pub fn shapes(title: &str, recording: &Recording, records: &[usize]) -> Figure {
     let mut figure = Figure::new(title, "x (mm)", "z (mm)");
-    figure.equal_aspect();
-    if recording.meta.ground.is_some() {
-        figure.horizontal(0.0);
-    }
     for (i, &record) in records.iter().enumerate() {
-        let share = i as f64 / (records.len().max(2) - 1) as f64;
-        let label = format!("{:.1} ms", 1e3 * recording.time[record]);
-        figure.line(&label, shape(recording, record), &colour(0.9 * share), 2.2);
+        if i > 0 {
+            figure.panel("z (mm)");
+        }
+        figure.filled_aspect().panel_title(&format!("{} ms", significant((1e4 * recording.time[record]).round() / 10.0, 7)));
+        if recording.meta.ground.is_some() {
+            figure.floor();
+        }
+        figure.robot("", shape(recording, record), "#0072b2");
     }
     figure
 }
@@ -69,14 +72,49 @@ fn height(recording: &Recording, node: usize) -> Vec<f64> {
     (0..recording.len()).map(|record| mm_from_cm(recording.node(record, node)[2])).collect()
 }
 
-/// Heights of ends and middle in time.
+/// Heights and travel of ends and middle in time, and the voltages of the actuators in a strip below.
 pub fn traces(title: &str, recording: &Recording) -> Figure {
     let mut figure = Figure::new(title, "time (ms)", "height z (mm)");
+    let in_time = |values: Vec<f64>| recording.time.iter().zip(values).map(|(t, v)| (1e3 * t, v)).collect::<Vec<_>>();
+    figure.from_zero();
     for (label, node) in watched(recording) {
-        let z = height(recording, node);
-        figure.series(label, recording.time.iter().zip(z).map(|(t, z)| (1e3 * t, z)), Mark::Line);
+        figure.series(label, in_time(height(recording, node)), Mark::Line);
+    }
+    figure.panel("travel along x (mm)");
+    for (label, node) in watched(recording) {
+        let x = |record: usize| mm_from_cm(recording.node(record, node)[0]);
+        figure.series(label, in_time((0..recording.len()).map(|record| x(record) - x(0)).collect()), Mark::Line);
+    }
+    figure.panel("actuator voltage");
+    let by_record: Vec<Vec<f64>> = (0..recording.len()).map(|record| voltages(recording, record)).collect();
+    let mut groups: Vec<(Vec<usize>, Vec<f64>)> = Vec::new();
+    for actuator in 0..recording.meta.actuators {
+        let signal: Vec<f64> = by_record.iter().map(|volts| volts[actuator]).collect();
+        match groups.iter_mut().find(|(_, other)| *other == signal) {
+            Some((actuators, _)) => actuators.push(actuator + 1),
+            None => groups.push((vec![actuator + 1], signal)),
+        }
+    }
+    for (actuators, signal) in groups {
+        let (low, high) = signal.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let remark = if low == high {
+            format!("{} V", significant(low, 4))
+        } else {
+            format!("{} to {} V", significant(low, 4), significant(high, 4))
+        };
+        figure.strip(&numbers(&actuators), &remark, in_time(signal));
     }
     figure
+}
+
+/// Numbers as a list, with runs of three and more as a range: "1–3, 5".
+fn numbers(list: &[usize]) -> String {
+    let runs = list.chunk_by(|a, b| a + 1 == *b);
+    let text = |run: &[usize]| match run {
+        [first, _, .., last] => format!("{first}–{last}"),
+        _ => run.iter().map(usize::to_string).collect::<Vec<_>>().join(", "),
+    };
+    runs.map(text).collect::<Vec<_>>().join(", ")
 }
 
 /// Amplitude spectra of the heights of ends and middle, up to where they have fallen to nothing.
@@ -88,13 +126,16 @@ pub fn spectrum(title: &str, recording: &Recording) -> Figure {
         .collect();
     let highest = spectra.iter().flat_map(|(_, s)| s).map(|p| p.1).fold(0.0, f64::max);
     let limit = spectra.iter().flat_map(|(_, s)| s).filter(|p| p.1 > 0.01 * highest).map(|p| p.0).fold(0.0, f64::max);
+    figure.from_zero();
     for (label, spectrum) in spectra {
         let shown: Vec<_> = spectrum.into_iter().filter(|p| p.0 <= 1.5 * limit).collect();
         let peak = shown.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
-        figure.series(label, shown, Mark::Line);
-        if let Some((f, a)) = peak.filter(|p| p.1 > 0.5 * highest) {
-            figure.note(f, a, &format!(" {f:.1} Hz"));
-        }
+        // The peaks stand in the legend, where they cannot print over one another.
+        let label = match peak.filter(|p| p.1 > 0.0) {
+            Some((f, a)) => format!("{label}: {} mm at {} Hz", significant(a, 3), number(f, 1)),
+            None => label.to_owned(),
+        };
+        figure.series(&label, shown, Mark::Line);
     }
     figure
 }
