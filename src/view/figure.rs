@@ -238,6 +238,9 @@ impl Figure {
     }
 }
 
+/// A series in a legend, its style and its text.
+type Entry<'a> = (&'a Series, Style, String);
+
 /// Where everything of a figure goes.
 struct Layout<'a> {
     figure: &'a Figure,
@@ -411,7 +414,7 @@ impl<'a> Layout<'a> {
     }
 
     /// The entries in columns of one width, as many as fit: their texts, by rows.
-    fn legend_rows(&self, entries: &[(&'a Series, Style)]) -> (f64, Vec<Vec<(&'a Series, Style, String)>>) {
+    fn legend_rows(&self, entries: &[(&'a Series, Style)]) -> (f64, Vec<Vec<Entry<'a>>>) {
         let most = self.width - 2.0 * EDGE;
         let texts: Vec<_> = entries.iter().map(|(s, _)| shorten(&s.label, self.size, most - SAMPLE - 4.0)).collect();
         let widest = texts.iter().map(|text| width(text, self.size)).fold(0.0, f64::max);
