@@ -41,6 +41,15 @@ pub(crate) fn toml_error(error: &toml::de::Error) -> String {
     }
 }
 
+/// What the JSON parser found, likewise.
+pub(crate) fn json_error(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    match text.rsplit_once(" at line ") {
+        Some((message, place)) => format!("{}, at line {place}", plain(message)),
+        None => plain(&text),
+    }
+}
+
 /// A message of serde in plain words. It has a handful of forms, and what has none of them is left as it is.
 fn plain(message: &str) -> String {
     if let Some((name, known)) = named(message, "unknown field `") {
@@ -93,7 +102,7 @@ fn kind_found(found: &str) -> String {
 fn kind_needed(expected: &str) -> &str {
     match expected {
         "f64" => "a number",
-        "usize" | "u64" | "u32" | "u16" => "a whole number, 0 or more,",
+        "usize" | "u64" | "u32" | "u16" | "u8" => "a whole number, 0 or more,",
         "a string" | "path string" => "a text in quotes",
         "a boolean" => "true or false",
         "a sequence" => "a list in brackets",
@@ -164,6 +173,12 @@ mod tests {
         }
         let huge = format!("invalid type: floating point `1{}.0`, expected usize", "0".repeat(300));
         assert_eq!(plain(&huge), "this is 1e300, but a whole number, 0 or more, is needed");
+    }
+
+    #[test]
+    fn json_is_refused_with_its_line_in_plain_words() {
+        let said = json_error(&serde_json::from_str::<Vec<f64>>("[1.0,\n\"x\"]").unwrap_err());
+        assert_eq!(said, "this is the text \"x\", but a number is needed, at line 2 column 3");
     }
 
     #[test]

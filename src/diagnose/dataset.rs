@@ -376,7 +376,11 @@ fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunDa
         };
         let time = number(time_column)?;
         if times.last().is_some_and(|last| time <= *last) {
-            return Err(wrong(line, time_column + 1, format!("t_s is {time} after {}; times must rise", times[times.len() - 1])));
+            return Err(wrong(
+                line,
+                time_column + 1,
+                format!("t_s is {} after {}; times must rise", words::number(time), words::number(times[times.len() - 1])),
+            ));
         }
         times.push(time);
         for &column in &volt_columns {

@@ -41,7 +41,8 @@ pub enum EngineError {
     },
     /// A time step that the robot's slowest motion cannot be seen with.
     #[error(
-        "the time step {time_step} s is too long for this robot: at most {longest:.2e} s, a tenth of the period of one actuator's first mode"
+        "the time step {} s is too long for this robot: at most {longest:.2e} s, a tenth of the period of one actuator's first mode",
+        crate::words::number(*.time_step)
     )]
     StepTooLong {
         /// The step (s).

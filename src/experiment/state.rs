@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::Experiment;
 use crate::engine::{Engine, EngineError};
+use crate::words;
 
 /// A state between two steps, as a JSON object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,7 +44,8 @@ impl SavedState {
     /// # Errors
     /// What is wrong with the text, in words.
     pub fn parse(text: &str, experiment: &Experiment) -> Result<Self, String> {
-        let saved: Self = serde_json::from_str(text).map_err(|error| format!("not a saved state: {error}"))?;
+        let saved: Self =
+            serde_json::from_str(text).map_err(|error| format!("not a saved state: {}", words::json_error(&error)))?;
         if saved.schema != 1 {
             return Err(format!("a state of schema {}, but this program reads schema 1", saved.schema));
         }

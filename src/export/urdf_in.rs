@@ -172,7 +172,7 @@ fn body(link: &Link, base: bool, robot: &Robot) -> Result<f64, UrdfError> {
     let Geometry::Box { size } = &collision.geometry else { return bad("its <collision> must be a box".into()) };
     let [length, width, thickness] = size.0;
     if !(length.is_finite() && length > 0.0) {
-        return bad(format!("its box is {length} long"));
+        return bad(format!("its box is {} long", crate::words::number(length)));
     }
     for (name, found, needed) in [("width", width, robot.material.width), ("thickness", thickness, robot.collision_thickness)] {
         if !same(found, needed) {
