@@ -1,12 +1,18 @@
 //! What a diagnosis leaves for going on: the extended model as an experiment, its drive, and all residuals.
-
-use std::fmt::Write;
+//!
+//! The experiment takes the steps of the fit, so that `sfers run` gives what the fit predicted: at the rows of the run where they fall on steps,
+//! between recorded steps by the cubic through positions and velocities elsewhere.
 
 use super::dataset::Dataset;
-use super::plant::Plant;
-use super::robot::RobotPlant;
+use super::plant::{Model, Plant};
+use super::robot::{NUMERICAL_DAMPING, ON_STEP, RobotPlant};
 use super::verdict::Outcome;
+use crate::effects::View;
 use crate::experiment::{DriveConfig, EffectConfig, SimulationConfig, StepConfig};
+use crate::model::Mount;
+
+/// Most numbers that a run of the experiment records (160 MB).
+const MOST_RECORDED: f64 = 2e7;
 
 /// The files' texts.
 pub struct Files {
@@ -24,79 +30,114 @@ impl Files {
         let square = |run: &usize| outcome.calibrated.residuals[*run].iter().map(|r| r * r).sum::<f64>();
         let all = outcome.split.all();
         let run = all.iter().copied().max_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or(0);
-        let table = plant.command(run).table(&outcome.unknowns[run]);
-        let n = plant.robot().actuators;
-        let mut drive = String::from("t_s");
-        (1..=n).for_each(|a| drive += &format!(",v{a}_v"));
-        drive.push('\n');
-        for (row, t) in table.times().iter().enumerate() {
-            let _ = write!(drive, "{t:?}");
-            table.row(row).iter().for_each(|v| drive += &format!(",{v:?}"));
-            drive.push('\n');
-        }
-
-        let mut config = dataset.nominal.clone();
-        // The drive's positive voltages have their gain already.
-        config.robot.positive_gain = None;
-        config.drive = DriveConfig { waveform: Some("csv".into()), file: Some("drive.csv".into()), ..DriveConfig::default() };
-        let step = 0.5 * plant.step(run);
-        let duration = table.times().last().copied().unwrap_or(1.0).max(step);
-        config.simulation = SimulationConfig {
-            engine: Some("planar".into()),
-            start: Some("settled".into()),
-            time_step_s: Some(StepConfig::Seconds(step)),
-            duration_s: Some(duration),
-            record_every_s: Some((step * (1e-3 / step).ceil()).min(duration)),
-            ..SimulationConfig::default()
-        };
-        let model = outcome.extended.model();
-        if model.resolution as usize != plant.robot().motors_per_actuator {
-            let parameters = [("motors_per_actuator".to_owned(), model.resolution)].into();
-            config.effect.push(EffectConfig { id: "discretisation".into(), parameters });
-        }
-        for term in &model.terms {
-            let Ok(applied) = plant.applied(term) else { continue };
-            let pairs = applied.effect.parameters.iter().zip(&applied.values);
-            let parameters = pairs.filter(|(_, v)| v.is_finite()).map(|(p, v)| (p.name.to_owned(), *v)).collect();
-            config.effect.push(EffectConfig { id: applied.effect.id.into(), parameters });
-        }
-        let toml = toml::to_string(&config).unwrap_or_else(|error| format!("# cannot be written: {error}\n"));
-        let head = format!(
-            "# The nominal model of {} with what its diagnosis found, under the drive of run {}.\n",
-            dataset.name,
-            plant.signals()[run].id
-        );
-        Self { experiment: head + &toml, drive, residuals: residuals(plant, outcome) }
+        let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.unknowns[run]);
+        Self { experiment, drive, residuals: residuals(plant, outcome) }
     }
 }
 
-/// Every measured value beside what the models say.
+/// A model as an experiment file under the drive of a run, with the file of that drive, `drive.csv`: its recording is what the model predicts.
+pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usize, unknowns: &[f64]) -> (String, String) {
+    let table = plant.command(run).table(unknowns);
+    let n = plant.robot().actuators;
+    let names = std::iter::once("t_s".to_owned()).chain((1..=n).map(|a| format!("v{a}_v"))).collect();
+    let rows = table.times().iter().enumerate();
+    let drive = written(
+        std::iter::once(names)
+            .chain(rows.map(|(row, t)| std::iter::once(t).chain(table.row(row)).map(|x| format!("{x:?}")).collect())),
+    );
+
+    let mut config = dataset.nominal.clone();
+    // The drive's positive voltages have their gain already.
+    config.robot.positive_gain = None;
+    config.drive = DriveConfig { waveform: Some("csv".into()), file: Some("drive.csv".into()), ..DriveConfig::default() };
+    let mut effects = Vec::new();
+    if model.resolution as usize != plant.robot().motors_per_actuator {
+        let parameters = [("motors_per_actuator".to_owned(), model.resolution)].into();
+        config.effect.push(EffectConfig { id: "discretisation".into(), parameters });
+    }
+    for term in &model.terms {
+        let Ok(applied) = plant.applied(term) else { continue };
+        let pairs = applied.effect.parameters.iter().zip(&applied.values);
+        let parameters = pairs.filter(|(_, v)| v.is_finite()).map(|(p, v)| (p.name.to_owned(), *v)).collect();
+        config.effect.push(EffectConfig { id: applied.effect.id.into(), parameters });
+        effects.push(applied);
+    }
+    let step = plant.step(run) * if model.fine { 0.5 } else { 1.0 };
+    let steps = plant.steps_of(run, step);
+    // What a camera sees late lies between records, so every step is one.
+    let late = View::new(&effects).delay > 0.0;
+    let every = if late { 1 } else { interval(&plant.signals()[run].times, step).unwrap_or(1) };
+    let values = 10.0 * model.resolution * n as f64 + 13.0;
+    let every = every.max((steps as f64 * values / MOST_RECORDED).ceil() as u64).clamp(1, steps);
+    let mount = plant.robot().mount;
+    config.simulation = SimulationConfig {
+        engine: Some("planar".into()),
+        start: Some("settled".into()),
+        friction: (mount == Mount::Ground).then(|| "coulomb".into()),
+        numerical_damping_per_s: (mount == Mount::Clamped).then_some(NUMERICAL_DAMPING),
+        time_step_s: Some(StepConfig::Seconds(step)),
+        steps: Some(steps),
+        record_every_steps: Some(every),
+        record_from_step: Some(0),
+        ..SimulationConfig::default()
+    };
+    let toml = toml::to_string(&config).unwrap_or_else(|error| format!("# cannot be written: {error}\n"));
+    // Names may hold line breaks, comments may not.
+    let head = format!(
+        "# The nominal model of {} with what its diagnosis found, under the drive of run {}.\n# Its time 0 is t_s = {:?} of the run.\n",
+        dataset.name.escape_debug(),
+        plant.signals()[run].id.escape_debug(),
+        plant.start(run)
+    );
+    (head + &toml, drive)
+}
+
+/// The largest number of steps of which all times are multiples; none if one lies between steps.
+fn interval(times: &[f64], step: f64) -> Option<u64> {
+    let mut common = 0_u64;
+    for t in times {
+        let at = (t / step).round();
+        if (t / step - at).abs() > ON_STEP {
+            return None;
+        }
+        let (mut a, mut b) = (common, at as u64);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        common = a;
+    }
+    (common > 0).then_some(common)
+}
+
+/// Rows as CSV.
+fn written(rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        // A vector in memory takes every row.
+        let _ = table.write_record(&row);
+    }
+    String::from_utf8_lossy(&table.into_inner().unwrap_or_default()).into_owned()
+}
+
+/// Every measured value beside what the models say, in digits that bring back the same bits.
 fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
     let channels = plant.channels();
-    let mut out = String::from("run,role,channel,t_s,measured_mm,nominal_mm,calibrated_mm,extended_mm,used\n");
-    for run in outcome.split.all() {
+    let head = ["run", "role", "channel", "t_s", "measured_mm", "nominal_mm", "calibrated_mm", "extended_mm", "used"];
+    let rows = outcome.split.all().into_iter().flat_map(|run| {
         let signal = &plant.signals()[run];
         let role = if outcome.split.held.contains(&run) { "held-out" } else { "fit" };
-        for i in 0..signal.values.len() {
-            let of = |residuals: &[Vec<f64>]| signal.values[i] - residuals[run][i] * signal.sigmas[i];
+        let channels = &channels;
+        (0..signal.values.len()).map(move |i| {
             let used = outcome.used[run][i];
             let predicted = [&outcome.nominal, &outcome.calibrated, &outcome.extended].map(|scored| {
                 // Residuals of values left out are not kept.
-                if used { format!("{:.5}", of(&scored.residuals)) } else { String::new() }
+                let value = signal.values[i] - scored.residuals[run][i] * signal.sigmas[i];
+                if used { format!("{value:?}") } else { String::new() }
             });
-            let _ = writeln!(
-                out,
-                "{},{role},{},{:.6},{},{},{},{},{}",
-                signal.id,
-                channels[signal.channels[i]],
-                signal.times[i] + plant.start(run),
-                signal.values[i],
-                predicted[0],
-                predicted[1],
-                predicted[2],
-                u8::from(used)
-            );
-        }
-    }
-    out
+            let named = [&signal.id, role, &channels[signal.channels[i]]].map(str::to_owned);
+            let numbers = [signal.times[i] + plant.start(run), signal.values[i]].map(|x| format!("{x:?}"));
+            named.into_iter().chain(numbers).chain(predicted).chain([u8::from(used).to_string()]).collect()
+        })
+    });
+    written(std::iter::once(head.map(str::to_owned).to_vec()).chain(rows))
 }

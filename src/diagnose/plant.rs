@@ -20,7 +20,14 @@ pub struct Free {
 impl Free {
     /// The value that a coordinate stands for.
     pub fn value(&self, coordinate: f64) -> f64 {
-        if self.inverse { 1.0 / coordinate } else { coordinate }
+        if !self.inverse {
+            coordinate
+        } else if coordinate == 0.0 {
+            // Whatever the sign of zero: the side on which the bounds lie.
+            if self.bounds[0] < 0.0 { f64::NEG_INFINITY } else { f64::INFINITY }
+        } else {
+            1.0 / coordinate
+        }
     }
 }
 

@@ -23,7 +23,10 @@ const GROUND_STEP: f64 = 1e-4;
 /// A longer step may change a run's prediction by this share of the noise (rms).
 const LARGEST_CHANGE: f64 = 0.15;
 /// Of a clamped robot (1/s): a tenth of the engine's own, which at resonance would take 0.2 % of the amplitude.
-const NUMERICAL_DAMPING: f64 = 5.0;
+pub(super) const NUMERICAL_DAMPING: f64 = 5.0;
+
+/// Rows so near to a step, as a share of its length, take its state.
+pub(super) const ON_STEP: f64 = 1e-6;
 
 /// An experiment that could be made.
 pub struct Scene {
@@ -138,6 +141,11 @@ impl RobotPlant {
     /// The time (s) at which a run's rows begin.
     pub fn start(&self, run: usize) -> f64 {
         self.starts[run]
+    }
+
+    /// The number of steps of `step` (s) that a run takes: one more than to its last row, so that the state there is a record.
+    pub fn steps_of(&self, run: usize, step: f64) -> u64 {
+        (self.durations[run] / step - ON_STEP).ceil().max(0.0) as u64 + 1
     }
 
     /// The command of a run.
@@ -396,7 +404,7 @@ impl RobotPlant {
     fn predict_with(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64], step: f64) -> Result<Vec<f64>, String> {
         let table = self.commands[run].table(unknowns);
         let Staged { robot, drive, path, view } =
-            self.staged(self.robot.clone(), terms, resolution, table, self.durations[run])?;
+            self.staged(self.robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
         // Rows at the same time stand in several channels.
         let mut times = signal.times.clone();
@@ -495,8 +503,8 @@ fn track_from(
     while next < times.len() {
         let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
         // Rows that fall on a step take its state; the others lie between two.
-        let here = |t: f64| t <= from + 1e-6 * h;
-        let due = times[next] < to - 1e-6 * h;
+        let here = |t: f64| t <= from + ON_STEP * h;
+        let due = times[next] < to - ON_STEP * h;
         if due {
             look(&mut engine, &mut before)?;
             while next < times.len() && here(times[next]) {
@@ -522,9 +530,9 @@ fn track_from(
         engine.prepare(&volts)?;
         engine.advance()?;
         step += 1;
-        if times[next] < to - 1e-6 * h {
+        if times[next] < to - ON_STEP * h {
             look(&mut engine, &mut after)?;
-            while next < times.len() && times[next] < to - 1e-6 * h {
+            while next < times.len() && times[next] < to - ON_STEP * h {
                 let t = times[next];
                 tracks.extend(before.iter().zip(&after).map(|([x0, z0, u0, w0], [x1, z1, u1, w1])| {
                     [hermite(t, [from, to], [*x0, *u0], [*x1, *u1]), hermite(t, [from, to], [*z0, *w0], [*z1, *w1])]

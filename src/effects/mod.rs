@@ -301,8 +301,8 @@ impl Applied {
 pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Result<(), EffectError> {
     effects.iter().try_for_each(|applied| applied.check(robot))?;
     // The number of joints first: others have a value per joint.
-    if let Some(joints) = effects.iter().find_map(|applied| applied.get("motors_per_actuator")) {
-        robot.motors_per_actuator = joints as usize;
+    if let Some(joints) = joints(effects) {
+        robot.motors_per_actuator = joints;
     }
     for applied in effects.iter().filter(|applied| !applied.is_off()) {
         match applied.effect.action {
@@ -312,6 +312,12 @@ pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Resul
         }
     }
     Ok(())
+}
+
+/// Joints per actuator that effects ask for.
+pub fn joints(effects: &[Applied]) -> Option<usize> {
+    let joints = effects.iter().filter_map(|applied| applied.get("motors_per_actuator")).find(|joints| *joints > 0.0);
+    joints.map(|joints| joints as usize)
 }
 
 /// Factor on the time step that effects ask for.

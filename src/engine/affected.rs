@@ -9,12 +9,14 @@ pub struct AffectedEngine {
     path: Path,
     time_step: f64,
     voltages: Vec<f64>,
+    /// Of one part of a step.
+    piece: Vec<f64>,
 }
 
 impl AffectedEngine {
     /// `engine`, which steps by `time_step` (s), behind a `path` that has come to rest at the first voltages.
     pub fn new(engine: Box<dyn Engine>, path: Path, time_step: f64) -> Self {
-        Self { engine, path, time_step, voltages: Vec::new() }
+        Self { engine, path, time_step, voltages: Vec::new(), piece: Vec::new() }
     }
 }
 
@@ -24,6 +26,25 @@ impl Engine for AffectedEngine {
         self.voltages.clear();
         self.voltages.extend_from_slice(voltages);
         self.path.pass(self.time_step, &mut self.voltages);
+        self.engine.prepare(&self.voltages)
+    }
+
+    fn parts(&self) -> usize {
+        self.path.parts()
+    }
+
+    /// Each part passes on its own; the engine gets the mean of what comes out.
+    fn prepare_parts(&mut self, means: &[f64]) -> Result<(), EngineError> {
+        let parts = self.path.parts();
+        let actuators = means.len() / parts;
+        self.voltages.clear();
+        self.voltages.resize(actuators, 0.0);
+        for mean in means.chunks_exact(actuators) {
+            self.piece.clear();
+            self.piece.extend_from_slice(mean);
+            self.path.pass(self.time_step / parts as f64, &mut self.piece);
+            self.voltages.iter_mut().zip(&self.piece).for_each(|(sum, v)| *sum += v / parts as f64);
+        }
         self.engine.prepare(&self.voltages)
     }
 

@@ -134,6 +134,19 @@ pub trait Engine {
     /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number.
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError>;
 
+    /// Into how many equal parts of a step the voltages are better given, where they may jump within it: see [`prepare_parts`](Self::prepare_parts).
+    fn parts(&self) -> usize {
+        1
+    }
+
+    /// Takes the mean voltages (V) of [`parts`](Self::parts) equal parts of the coming step, one per actuator, part after part.
+    ///
+    /// # Errors
+    /// As [`prepare`](Self::prepare).
+    fn prepare_parts(&mut self, means: &[f64]) -> Result<(), EngineError> {
+        self.prepare(means)
+    }
+
     /// The joints between [`prepare`](Self::prepare) and [`advance`](Self::advance), with the torques of the coming step.
     fn joints(&mut self) -> &JointState;
 

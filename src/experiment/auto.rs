@@ -66,7 +66,7 @@ pub(super) fn choose(
         s.time_step_s = Some(StepConfig::Seconds(step));
         s.duration_s = Some(duration);
         if record.is_some() {
-            (s.record_every_s, s.record_every_steps) = (record, None);
+            (s.record_every_s, s.record_every_steps, s.record_from_step) = (record, None, None);
         }
         resolve(&config)
     };

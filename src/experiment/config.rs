@@ -176,6 +176,10 @@ pub struct PhaseConfig {
 }
 
 /// `[simulation]`.
+///
+/// `numerical_damping_per_s` (planar engine) is the weight of a step's end over that of its start, per time step: see
+/// [`PlanarEngine::with_numerical_damping`](crate::engine::PlanarEngine::with_numerical_damping). `record_from_step` is the step of the first
+/// regular record, the state before it: 0 records at whole multiples of the interval; absent, the records are those of the reference, one step earlier.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs)]
@@ -183,6 +187,7 @@ pub struct SimulationConfig {
     pub engine: Option<String>,
     pub start: Option<String>,
     pub friction: Option<String>,
+    pub numerical_damping_per_s: Option<f64>,
     pub time_step_s: Option<StepConfig>,
     pub step_error: Option<f64>,
     pub step_measure: Option<String>,
@@ -190,6 +195,7 @@ pub struct SimulationConfig {
     pub duration_s: Option<f64>,
     pub record_every_steps: Option<u64>,
     pub record_every_s: Option<f64>,
+    pub record_from_step: Option<u64>,
 }
 
 /// A time step: seconds, or the word `auto`.

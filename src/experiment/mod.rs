@@ -52,12 +52,16 @@ pub struct Experiment {
     pub steps: u64,
     /// A record is taken every so many steps, and at the first and last.
     pub record_every: u64,
+    /// The step before which the first regular record is taken.
+    pub record_from: u64,
     /// What steps the robot.
     pub engine: EngineKind,
     /// Where the robot starts from.
     pub start: Start,
     /// How the planar engine treats sliding.
     pub friction: FrictionModel,
+    /// Numerical damping of the planar engine (1/s), where it is not the engine's own.
+    pub numerical_damping: Option<f64>,
     /// Extensions of the model; those that act on robot and drive are in them already.
     pub effects: Vec<Applied>,
     /// How the time step was chosen, if the program chose it.
@@ -97,7 +101,10 @@ impl Experiment {
         let engine: Box<dyn Engine> = match self.engine {
             EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
             EngineKind::Planar => {
-                let mut engine = PlanarEngine::new(&self.robot, self.time_step)?;
+                let mut engine = match self.numerical_damping {
+                    Some(damping) => PlanarEngine::with_numerical_damping(&self.robot, self.time_step, damping)?,
+                    None => PlanarEngine::new(&self.robot, self.time_step)?,
+                };
                 engine.set_friction_model(self.friction);
                 if self.start == Start::Settled {
                     engine.settle(&voltages)?;
@@ -108,9 +115,11 @@ impl Experiment {
         Ok(if path.is_empty() { engine } else { Box::new(AffectedEngine::new(engine, path, self.time_step)) })
     }
 
-    /// Whether the state before step `step` is recorded: `(step + 1)` a multiple of the interval, or the first or last step.
+    /// Whether the state before step `step` is recorded: a multiple of the interval after the first regular record, or the first or last step. By
+    /// default `(step + 1)` is a multiple of the interval, as in the reference.
     pub fn records(&self, step: u64) -> bool {
-        (step + 1).is_multiple_of(self.record_every) || step == 0 || step == self.steps - 1
+        let regular = step.checked_sub(self.record_from).is_some_and(|past| past.is_multiple_of(self.record_every));
+        regular || step == 0 || step == self.steps - 1
     }
 
     /// The numbers that go with the recording of a run of `steps` steps, saved at `date_time`.

@@ -56,6 +56,9 @@ fn read(source: &Source, trials: bool) -> Result<Experiment, ConfigError> {
 fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, Trouble> {
     let mut robot = robot(config)?;
     let effects = effects(config)?;
+    if let Some(joints) = effects::joints(&effects) {
+        robot.motors_per_actuator = joints;
+    }
     robot.check().map_err(|ModelError::Value { key, value, needed }| {
         Fault::new(key, format!("is {}, but must be {needed}", number(value)))
     })?;
@@ -72,6 +75,15 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
         return Err(Fault::new("simulation.friction", "belongs to engine = \"planar\"; Bullet has a model of its own").into());
     }
     let s = &config.simulation;
+    if let Some(damping) = s.numerical_damping_per_s {
+        let key = "simulation.numerical_damping_per_s";
+        if engine == EngineKind::Bullet {
+            return Err(Fault::new(key, "belongs to engine = \"planar\"; Bullet has none").into());
+        }
+        if !(damping.is_finite() && damping >= 0.0) {
+            return Err(Fault::new(key, format!("is {damping}, but must be a number from 0 on")).into());
+        }
+    }
     if let Some(StepConfig::Word(word)) = &s.time_step_s {
         if word != "auto" {
             return Err(
@@ -89,6 +101,10 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
         }
     }
     let (time_step, steps, record_every) = simulation(config, &robot, effects::time_step_scale(&effects))?;
+    let record_from = s.record_from_step.unwrap_or(record_every - 1);
+    if record_from >= steps {
+        return Err(Fault::new("simulation.record_from_step", format!("is {record_from}, but the run has {steps} steps")).into());
+    }
     // The reference is at 0 V in its first two steps.
     let first = if engine == EngineKind::Bullet { 2.0 * time_step } else { 0.0 };
     let waveform = waveform(&config.drive, &robot, first, folder)?;
@@ -100,9 +116,11 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
         time_step,
         steps,
         record_every,
+        record_from,
         engine,
         start,
         friction,
+        numerical_damping: config.simulation.numerical_damping_per_s,
         effects,
         step_choice: None,
         config: config.clone(),

@@ -63,7 +63,8 @@ impl Run {
 ///
 /// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time
 /// is step · dt; joints are read and torques computed; the state before the step is recorded if its turn has come; the torques are
-/// applied and the world steps. An engine that works at the middle of a step gets the step's mean voltages instead. Nothing is allocated inside the loop: the recording has its final size from the start.
+/// applied and the world steps. An engine that works at the middle of a step gets the step's mean voltages instead,
+/// or those of several parts of the step if it asks for them. Nothing is allocated inside the loop: the recording has its final size from the start.
 ///
 /// # Errors
 /// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
@@ -76,6 +77,8 @@ pub fn run(
     let mut books = experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step));
     let mut voltages = vec![0.0; experiment.robot.actuators];
     let midpoint = engine.midpoint();
+    let parts = engine.parts();
+    let mut pieces = vec![0.0; parts * experiment.robot.actuators];
     let mut interrupted = false;
     let mut done = engine.step();
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
@@ -87,13 +90,20 @@ pub fn run(
         }
         let before = time;
         time = done as f64 * experiment.time_step;
-        if midpoint {
+        if midpoint && parts > 1 {
+            let at = |part: usize| time + experiment.time_step * part as f64 / parts as f64;
+            for (part, piece) in pieces.chunks_exact_mut(experiment.robot.actuators).enumerate() {
+                means.over(at(part), at(part + 1), piece);
+            }
+            engine.prepare_parts(&pieces)?;
+        } else if midpoint {
             let end = (done + 1) as f64 * experiment.time_step;
             means.over(time, end, &mut voltages);
+            engine.prepare(&voltages)?;
         } else {
             experiment.drive.voltages(before, &mut voltages);
+            engine.prepare(&voltages)?;
         }
-        engine.prepare(&voltages)?;
         if let Some(books) = &mut books {
             books.take(engine)?;
         }

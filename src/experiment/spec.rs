@@ -48,6 +48,12 @@ impl Experiment {
             "steps": self.steps,
             "record_every_steps": self.record_every,
         });
+        if let Some(damping) = self.numerical_damping {
+            spec["numerical_damping"] = json!(damping);
+        }
+        if self.record_from + 1 != self.record_every {
+            spec["record_from_step"] = json!(self.record_from);
+        }
         if !self.effects.is_empty() {
             let values = |applied: &Applied| {
                 let pairs = applied.effect.parameters.iter().zip(&applied.values);

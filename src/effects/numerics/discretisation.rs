@@ -18,9 +18,9 @@ pub const DISCRETISATION: Effect = Effect {
             name: "motors_per_actuator",
             unit: "",
             bounds: [1.0, 100.0],
-            off: None,
-            default: None,
-            about: "joints per actuator in place of the file’s",
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "joints per actuator in place of the file’s; 0: the file’s",
         },
         Parameter {
             name: "time_step_scale",

@@ -1,0 +1,146 @@
+//! The extended model that a diagnosis writes is the model that was fitted: `sfers run` gives what the fit predicted.
+
+mod common;
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use common::sfers;
+use sfers::diagnose::dataset::Dataset;
+use sfers::diagnose::extended;
+use sfers::diagnose::plant::{Model, Plant, Term};
+use sfers::diagnose::quality;
+use sfers::diagnose::robot::RobotPlant;
+use sfers::experiment::{self, Control, Source};
+
+/// Agreement (mm): rounding of results that are computed alike.
+const SAME: f64 = 1e-9;
+
+/// A short run of two actuators with jumps and slopes of both signs, on rows that fall on steps.
+fn write(folder: &Path, mount: &str, m: usize) {
+    let toml = format!(
+        "[dataset]\nname = \"x\"\n[robot]\nactuators = 2\nmotors_per_actuator = {m}\nmount = \"{mount}\"\ndamping_eta = 0.01\npositive_gain = 1.2\n\
+         [markers]\nmid = 100.0\ntip = 200.0\n[noise]\ndefault_mm = 0.05\n[[run]]\nid = \"a\"\nfile = \"a.csv\"\n"
+    );
+    fs::write(folder.join("x.toml"), toml).unwrap();
+    let mut rows = String::from("t_s,v1_v,v2_v,mid_x_mm,mid_z_mm,tip_x_mm,tip_z_mm\n");
+    for i in 0..60 {
+        let t = 0.002 * f64::from(i);
+        let first = if i < 12 { 0.0 } else { -900.0 };
+        let second = 250.0 * (60.0 * t).sin() - 100.0;
+        writeln!(rows, "{t},{first},{second:.2},{0},{0},{0},{0}", 0.01 * (i % 7) as f64).unwrap();
+    }
+    fs::write(folder.join("a.csv"), rows).unwrap();
+}
+
+/// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.
+fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) -> Result<f64, String> {
+    let unknowns = vec![0.4; plant.unknowns(0)];
+    let predicted = plant.predict(model, 0, &unknowns)?;
+    let (toml, drive) = extended::experiment(dataset, plant, model, 0, &unknowns);
+    fs::write(folder.join("extended.toml"), &toml).unwrap();
+    fs::write(folder.join("drive.csv"), drive).unwrap();
+    let source = Source::from_file(&folder.join("extended.toml")).unwrap();
+    let experiment = experiment::experiment(&source).map_err(|error| format!("{error}\n{toml}"))?;
+    let mut engine = experiment.engine().unwrap();
+    let recording = experiment::run(&experiment, engine.as_mut(), |_| Control::Continue).unwrap().recording;
+    // Both markers stand on joints: at the end, and half way.
+    let nodes = recording.nodes();
+    let segments = experiment.robot.segments();
+    let mut along = 0.0;
+    let mut places = Vec::new();
+    for segment in &segments {
+        places.push(along);
+        along += segment.length;
+    }
+    places.push(along);
+    let mut worst = 0.0_f64;
+    for (i, signal) in predicted.iter().enumerate() {
+        let (t, channel) = (plant.signals()[0].times[i], plant.signals()[0].channels[i]);
+        let record = recording.time.iter().position(|time| (time - t).abs() < 1e-9).ok_or("no record at a row")?;
+        let position = plant.markers()[channel / 2];
+        let body = (0..nodes - 1).rev().find(|body| places[*body] < position).unwrap_or(0);
+        let share = (position - places[body]) / (places[body + 1] - places[body]);
+        let axis = 2 * (channel % 2);
+        let between = |of: &dyn Fn(usize) -> f64| of(body) + share * (of(body + 1) - of(body));
+        let shift = if axis == 0 { 0.5 * segments[0].length } else { 0.0 };
+        let view = between(&|node| recording.node(record, node)[axis]) + shift;
+        worst = worst.max((10.0 * view - signal).abs());
+    }
+    Ok(worst)
+}
+
+#[test]
+fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
+    for (mount, m) in [("clamped", 3), ("ground", 2)] {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), mount, m);
+        let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
+        let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+        let nominal = Model { terms: Vec::new(), resolution: m as f64, fine: true };
+        let plain = plant.predict(&nominal, 0, &vec![0.4; plant.unknowns(0)]).unwrap();
+        let resolutions = [m as f64, 5.0];
+        for resolution in resolutions {
+            let found = apart(folder.path(), &dataset, &plant, &Model { resolution, ..nominal.clone() }).unwrap();
+            assert!(found < SAME, "{mount}, {resolution} joints: {found} mm");
+        }
+        let mut moved = 0;
+        for (candidate, c) in plant.candidates().iter().enumerate() {
+            for start in &c.starts {
+                for share in [1.0, 1e-6] {
+                    // On the way from where the cause does nothing.
+                    let x = start.iter().zip(&c.parameters).map(|(x, p)| p.off.map_or(*x, |off| off + share * (x - off)));
+                    let model = Model { terms: vec![Term { candidate, x: x.collect() }], resolution: 4.0, fine: true };
+                    // A limit so far off that no file may hold it is none that a fit may adopt.
+                    let Ok(predicted) = plant.predict(&model, 0, &vec![0.4; plant.unknowns(0)]) else {
+                        assert!(share < 1.0 && c.parameters.iter().any(|p| p.inverse), "{}", c.id);
+                        continue;
+                    };
+                    let found =
+                        apart(folder.path(), &dataset, &plant, &model).unwrap_or_else(|error| panic!("{}: {error}", c.id));
+                    assert!(found < SAME, "{mount}, {} {:?}: {found} mm", c.id, model.terms[0].x);
+                    moved += usize::from(predicted.iter().zip(&plain).any(|(a, b)| (a - b).abs() > 1e-3));
+                }
+            }
+        }
+        assert!(moved > 20, "{mount}: only {moved} models differ from the nominal one");
+    }
+}
+
+/// Diagnoses the single run of [`write`] and compares the file's recording with the column of residuals.csv.
+fn as_a_user_does(mount: &str) -> f64 {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), mount, 2);
+    let done = |args: &[&str]| {
+        let output = sfers(folder.path(), args);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    done(&["diagnose", "x.toml", "--out", "d", "--quiet"]);
+    done(&["run", "d/extended.toml", "--out", "run.csv", "--quiet"]);
+    let mut run = csv::Reader::from_path(folder.path().join("run.csv")).unwrap();
+    let heads = run.headers().unwrap().clone();
+    // The tip is the last node.
+    let last = heads.iter().filter(|head| head.starts_with("node") && head.ends_with("_z_mm")).count() - 1;
+    let column = |name: &str| heads.iter().position(|head| head == name).unwrap();
+    let (time, z) = (column("t_s"), column(&format!("node{last}_z_mm")));
+    let rows: Vec<csv::StringRecord> = run.records().map(Result::unwrap).collect();
+    let recorded = |t: f64| rows.iter().find(|row| (row[time].parse::<f64>().unwrap() - t).abs() < 1e-9).unwrap();
+    let mut residuals = csv::Reader::from_path(folder.path().join("d/residuals.csv")).unwrap();
+    let (mut worst, mut count) = (0.0_f64, 0);
+    for row in residuals.records().map(Result::unwrap).filter(|row| &row[2] == "tip_z" && &row[8] == "1") {
+        let (t, extended) = (row[3].parse::<f64>().unwrap(), row[7].parse::<f64>().unwrap());
+        worst = worst.max((recorded(t)[z].parse::<f64>().unwrap() - extended).abs());
+        count += 1;
+    }
+    assert!(count > 30, "{count}");
+    worst
+}
+
+#[test]
+fn the_written_file_gives_the_column_of_the_residuals_clamped_and_on_the_floor() {
+    for mount in ["clamped", "ground"] {
+        let worst = as_a_user_does(mount);
+        assert!(worst < SAME, "{mount}: {worst} mm");
+    }
+}
