@@ -116,6 +116,29 @@ fn bad_data_are_refused_with_file_line_and_column() {
         (format!("{HEAD}{RUN}{RUN}"), good, 3, vec!["x.toml", "two runs"]),
         (format!("{HEAD}legs = 4\n{RUN}").replace("tip = 100.0", "tip = 300.0"), good, 3, vec!["300"]),
         (format!("{HEAD}{RUN}speed = 3\n"), good, 2, vec!["x.toml", "line 11", "speed"]),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n0,0,1\n", 3, vec!["a.csv, line 2", "one row"]),
+        (
+            format!("{HEAD}{RUN}"),
+            "t_s,v1_v,tip_z_mm\n0,0,1\n0.1,-2e5,1\n",
+            3,
+            vec!["a.csv, line 3, column 2", "v1_v", "beyond 10000 V"],
+        ),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n0,0,1\n0.1,0,1e300\n", 3, vec!["a.csv, line 3, column 3", "mm"]),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n0,0,1\ninf,0,1\n", 3, vec!["a.csv, line 3, column 1", "inf"]),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n0,0,1\n0.1,nan,1\n", 3, vec!["a.csv, line 3, column 2", "nan"]),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n0,0,1\n1e-12,0,1\n", 3, vec!["a.csv, line 3, column 1", "rise"]),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n0,0,1\n1e6,0,1\n2e6,0,2\n", 3, vec!["a.csv", "run a", "in seconds"]),
+        (format!("{HEAD}{RUN}"), "t_s,v1_v,tip_z_mm\n", 3, vec!["a.csv, line 1", "no rows"]),
+        (format!("{HEAD}{RUN}").replace("a.csv", "."), good, 3, vec!["is not a file"]),
+        (format!("{HEAD}{RUN}").replace("a.csv", "/dev/zero"), good, 3, vec!["/dev/zero", "is not a file"]),
+        (format!("{HEAD}{RUN}").replace("a.csv", "b.csv"), good, 3, vec!["b.csv"]),
+        (format!("{HEAD}{RUN}").replace("\"a\"", "\" \""), good, 3, vec!["x.toml, line 9", "id is empty"]),
+        (format!("{HEAD}[noise]\ndefault_mm = -0.1\n{RUN}"), good, 3, vec!["x.toml, line 9", "default_mm", "-0.1"]),
+        (format!("{HEAD}[noise]\ntip_mm = nan\n{RUN}"), good, 3, vec!["x.toml, line 9", "tip_mm"]),
+        (format!("{HEAD}{RUN}").replace("tip = 100.0", "tip = -1.0"), good, 3, vec!["x.toml, line 7", "-1"]),
+        (format!("{HEAD}{RUN}").replace("tip = 100.0", "tip = nan"), good, 3, vec!["x.toml, line 7", "NaN"]),
+        (format!("{HEAD}{RUN}").replace("actuators = 1", "actuators = 4000000000"), good, 2, vec!["x.toml, line 4", "actuators"]),
+        (format!("{HEAD}{RUN}").replace("actuators = 1", "actuators = 0"), good, 2, vec!["x.toml, line 4", "actuators"]),
     ] {
         fs::write(folder.path().join("x.toml"), &toml).unwrap();
         fs::write(folder.path().join("a.csv"), csv).unwrap();
@@ -165,4 +188,141 @@ fn effects_are_listed_with_their_parameters() {
     assert!(text.contains("hysteresis (actuation)") && text.contains("mass_g (g)"));
     let json: Value = serde_json::from_slice(&sfers(folder.path(), &["effects", "--json"]).stdout).unwrap();
     assert_eq!(json["effects"].as_array().unwrap().len(), 30);
+}
+
+/// Two runs of a sample with `rows` rows, one of every `step`, and the height of one marker alone.
+fn thinned(folder: &Path, name: &str, runs: [&str; 2], step: usize, rows: usize, marker: &str) {
+    let at = if marker == "mid" { 50.0 } else { 100.0 };
+    let mut toml = format!(
+        "[dataset]\nname = \"few\"\n[robot]\nactuators = 1\nmotors_per_actuator = 3\nmount = \"clamped\"\ndamping_eta = 0.008\n[markers]\n\
+         {marker} = {at:?}\n[noise]\ndefault_mm = 0.05\n"
+    );
+    for run in runs {
+        let mut all = csv::Reader::from_path(sample(name).with_file_name(format!("{run}.csv"))).unwrap();
+        let column = all.headers().unwrap().iter().position(|head| head == format!("{marker}_z_mm")).unwrap();
+        let mut few = csv::Writer::from_path(folder.join(format!("{run}.csv"))).unwrap();
+        few.write_record(["t_s", "v1_v", &format!("{marker}_z_mm")]).unwrap();
+        for row in all.records().map(Result::unwrap).step_by(step).take(rows) {
+            few.write_record([&row[0], &row[1], &row[column]]).unwrap();
+        }
+        toml += &format!("[[run]]\nid = \"{run}\"\nfile = \"{run}.csv\"\n");
+    }
+    fs::write(folder.join("few.toml"), toml).unwrap();
+}
+
+#[test]
+fn a_cause_whose_range_reaches_where_it_does_nothing_is_not_named() {
+    let folder = tempfile::tempdir().unwrap();
+    // 400 V at 18 Hz and 7 Hz, seen half way: loops of 3 % and a gain do as well as none.
+    thinned(folder.path(), "sample-hysteresis", ["ac-18hz-400v", "square-7hz"], 2, 200, "mid");
+    let output = sfers(folder.path(), &["diagnose", "few.toml", "--out", "d", "--quiet", "--json", "--require"]);
+    let d: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), ids(&d)), (Some(1), vec![]), "{}", d["summary"]);
+    assert!(d["summary"].as_str().unwrap().contains("insufficient") && d["next_experiment"].is_string(), "{d}");
+    // Nor is it in the extended model.
+    let text = fs::read_to_string(folder.path().join("d/extended.toml")).unwrap();
+    assert!(!text.contains("hysteresis\""), "{text}");
+}
+
+#[test]
+fn too_little_data_name_nothing_say_what_to_measure_and_fail_what_is_required() {
+    let folder = tempfile::tempdir().unwrap();
+    thinned(folder.path(), "sample-tip-mass", ["ac-12hz-400v", "ac-18hz-400v"], 3, 39, "tip");
+    let output = sfers(folder.path(), &["diagnose", "few.toml", "--out", "d", "--quiet", "--json", "--require"]);
+    let d: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), ids(&d)), (Some(1), vec![]), "{}", d["summary"]);
+    assert!(d["summary"].as_str().unwrap().contains("39 values to fit and 39 to judge by are too little"), "{}", d["summary"]);
+    assert!(d["next_experiment"].as_str().unwrap().contains("three runs"));
+}
+
+#[test]
+fn a_voltage_with_too_few_rows_for_its_drive_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("x.toml"), format!("{HEAD}{RUN}")).unwrap();
+    let rows: String = (0..90)
+        .map(|i| {
+            let t = f64::from(i) / 30.0;
+            format!("{t},{:.2},{:.3}\n", -500.0 * (1.0 - (36.0 * std::f64::consts::PI * t).cos()), -2.0 - 0.1 * f64::from(i % 5))
+        })
+        .collect();
+    fs::write(folder.path().join("a.csv"), format!("t_s,v1_v,tip_z_mm\n{rows}")).unwrap();
+    let output = sfers(folder.path(), &["diagnose", "x.toml", "--out", "d"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(
+        ["a.csv", "run a", "v1_v", "30.0 rows per second", "ten times per period"].iter().all(|w| text.contains(w)),
+        "{text}"
+    );
+    assert!(!folder.path().join("d").exists());
+}
+
+#[test]
+fn a_run_driven_from_a_file_has_no_damping_ratio() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows: String = (0..1000)
+        .map(|i| {
+            let t = 1e-3 * f64::from(i);
+            format!("{t},{}\n", -500.0 * (1.0 - (36.0 * std::f64::consts::PI * t).cos()))
+        })
+        .collect();
+    fs::write(folder.path().join("drive.csv"), format!("t_s,v1_v\n{rows}")).unwrap();
+    let toml = "[robot]\nactuators = 1\nmount = \"clamped\"\ndamping_eta = 0.008\n[drive]\nwaveform = \"csv\"\nfile = \"drive.csv\"\n[simulation]\n\
+                engine = \"planar\"\ntime_step_s = 1e-4\nduration_s = 1.0\n";
+    fs::write(folder.path().join("x.toml"), toml).unwrap();
+    let output = sfers(folder.path(), &["run", "x.toml", "--quiet", "--json"]);
+    let run: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let text = run.to_string();
+    assert!(text.contains("tip_amplitude_mm") && !text.contains("damping_ratio") && !text.contains("resonance_hz"), "{text}");
+}
+
+#[test]
+fn names_with_commas_quotes_and_line_breaks_stay_whole_in_every_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "[[run]]\nid = 'ID'\nfile = \"a.csv\"\n".replace("'ID'", "\"a, \\\"b\\\"\\nc/../d\"");
+    fs::write(folder.path().join("x.toml"), format!("{HEAD}{run}").replace("name = \"x\"", "name = \"x\\ny\"")).unwrap();
+    let rows: String = (0..100).map(|i| format!("{},{},{}\n", 0.01 * f64::from(i), -5 * i, -0.3 * f64::from(i))).collect();
+    fs::write(folder.path().join("a.csv"), format!("t_s,v1_v,tip_z_mm\n{rows}")).unwrap();
+    let output = sfers(folder.path(), &["diagnose", "x.toml", "--out", "d", "--quiet"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut residuals = csv::Reader::from_path(folder.path().join("d/residuals.csv")).unwrap();
+    let rows: Vec<csv::StringRecord> = residuals.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 100);
+    assert!(rows.iter().all(|row| &row[0] == "a, \"b\"\nc/../d" && &row[2] == "tip_z" && row.len() == 9), "{:?}", rows[0]);
+    let output = sfers(folder.path(), &["run", "d/extended.toml", "--quiet"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn every_key_of_an_observation_is_checked_and_named_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "[dataset]\nname = \"x\"\n[robot]\nactuators = 1\nmount = \"clamped\"\n";
+    let good = "[[observation]]\nmeasure = \"tip_deflection_mm\"\nvalue = -3.0\nsigma = 0.1\n[observation.drive]\nwaveform = \"dc\"\nvoltages_v = [-300]\n";
+    let with = |from: &str, to: &str| format!("{head}{good}{}", good.replace(from, to));
+    let marked = HEAD.to_owned() + RUN + good;
+    // The second observation's table is line 13.
+    for (toml, words) in [
+        (marked, vec!["line 11", "observation", "[[run]]"]),
+        (with("tip_deflection_mm", "tip_deflexion_mm"), vec!["line 14", "measure", "tip_deflexion_mm", "resonance_hz"]),
+        (with("tip_deflection_mm", "jump_height_mm"), vec!["line 14", "jump_height_mm", "clamped"]),
+        (with("tip_deflection_mm", "tip_phase_deg"), vec!["line 14", "tip_phase_deg", "period"]),
+        (with("tip_deflection_mm", "energy_error"), vec!["line 14", "energy_error"]),
+        (with("value = -3.0", "value = nan"), vec!["line 15", "value", "NaN"]),
+        (with("sigma = 0.1", "sigma = -0.1"), vec!["line 16", "sigma", "-0.1"]),
+        (with("[-300]", "[-300, 0]"), vec!["line 19", "voltages_v", "2 values for 1"]),
+        (with("\"dc\"", "\"ac\""), vec!["line 18", "waveform", "ac"]),
+        (with("[-300]\n", "[-300]\n[observation.simulation]\ntime_step_s = -1\n"), vec!["line 21", "time_step_s", "-1"]),
+        (with("[-300]\n", "[-300]\n[observation.simulation]\nduration_s = 1e7\n"), vec!["simulation", "steps"]),
+        (with("[-300]\n", "[-300]\n[observation.material]\nwidth_mm = -4\n"), vec!["line 21", "width", "must be"]),
+        (with("[-300]\n", "[-300]\n[observation.robot]\nmotors_per_actuator = 0\n"), vec!["line 21", "motors_per_actuator"]),
+        (with("sigma = 0.1\n", ""), vec!["sigma"]),
+        (with("sigma = 0.1\n", "sigma = 0.1\nunit = \"mm\"\n"), vec!["line 17", "unit"]),
+    ] {
+        fs::write(folder.path().join("x.toml"), &toml).unwrap();
+        fs::write(folder.path().join("a.csv"), "t_s,v1_v,tip_z_mm\n0,0,1\n0.1,0,1\n").unwrap();
+        let output = sfers(folder.path(), &["diagnose", "x.toml", "--out", "d"]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{toml}: {text}");
+        assert!(words.iter().all(|word| text.contains(word)), "{words:?} in {text}\n{toml}");
+        assert!(!folder.path().join("d").exists(), "{toml}");
+    }
 }

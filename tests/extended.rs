@@ -88,7 +88,7 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
         let mut moved = 0;
         for (candidate, c) in plant.candidates().iter().enumerate() {
             for start in &c.starts {
-                for share in [1.0, 1e-6] {
+                for share in [1.0, 1e-3] {
                     // On the way from where the cause does nothing.
                     let x = start.iter().zip(&c.parameters).map(|(x, p)| p.off.map_or(*x, |off| off + share * (x - off)));
                     let model = Model { terms: vec![Term { candidate, x: x.collect() }], resolution: 4.0, fine: true };

@@ -1,17 +1,32 @@
 //! Measured data: a description in TOML and one CSV per run, read with checks.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use thiserror::Error;
+use toml::de::{DeTable, DeValue};
+
+use super::observations::Fault;
+use super::{observations, robot, voltage};
+use crate::analytic;
 
 use crate::experiment::{
     Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment, presets,
 };
-use crate::model::Robot;
-use crate::recording::definitions;
+use crate::model::{Mount, Robot};
 use crate::words;
+
+/// Most time steps of a run: one prediction takes some seconds then, and a diagnosis needs hundreds.
+const MOST_STEPS: f64 = 2e7;
+/// Beyond these a column has another unit: MFC actuators take 1.5 kV, and no robot is a hundred metres long.
+const MOST_SECONDS: f64 = 1e7;
+const MOST_VOLTS: f64 = 1e4;
+const MOST_MM: f64 = 1e5;
+/// Jumps of the voltage between rows are given this width.
+const LEAST_SECONDS: f64 = 1e-8;
+const NOISE_MM: RangeInclusive<f64> = 1e-9..=1e5;
 
 /// Data that cannot be used as they are.
 #[derive(Debug, Error)]
@@ -181,10 +196,17 @@ impl Dataset {
             source_name: path.display().to_string(),
             message: words::toml_error(&error),
         })?;
-        let line_of =
-            |words: &str| text.lines().position(|line| line.trim_start().starts_with(words)).map_or(1, |at| at as u64 + 1);
         let wrong =
-            |words: &str, reason: String| DataError::Content { path: path.into(), line: line_of(words), column: 0, reason };
+            |way: &[Part], reason: String| DataError::Content { path: path.into(), line: line_of(&text, way), column: 0, reason };
+        if let (false, [_, ..]) = (description.run.is_empty(), &description.observation[..]) {
+            return Err(fault(
+                path,
+                &text,
+                &[Part::Key("observation"), Part::Index(0)],
+                "observation",
+                "stands beside [[run]]: a data set has runs or single numbers; describe the numbers in a file of their own",
+            ));
+        }
 
         let nominal = Config {
             material: description.material,
@@ -201,16 +223,16 @@ impl Dataset {
         let robot = resolved_robot(path, &text, &nominal)?;
         let length = robot.material.actuator_length * robot.actuators as f64;
         if description.run.is_empty() && description.observation.is_empty() {
-            return Err(wrong("[dataset]", "there are no runs: add [[run]] tables with id and file".into()));
+            return Err(wrong(&[Part::Key("dataset")], "there are no runs: add [[run]] tables with id and file".into()));
         }
         if description.markers.is_empty() && !description.run.is_empty() {
-            return Err(wrong("[dataset]", "there are no markers: add [markers] with name = distance in mm".into()));
+            return Err(wrong(&[Part::Key("markers")], "there are no markers: add [markers] with name = distance in mm".into()));
         }
         let mut markers = Vec::new();
         for (name, position) in &description.markers {
             if !(0.0..=10.0 * length + 1e-9).contains(position) {
                 return Err(wrong(
-                    name,
+                    &[Part::Key("markers"), Part::Key(name)],
                     format!(
                         "marker {name} is at {} mm, but the robot is {} mm long",
                         words::number(*position),
@@ -227,10 +249,15 @@ impl Dataset {
             if !known {
                 let known: Vec<_> = markers.iter().map(|marker| format!("{}_mm", marker.name)).collect();
                 let hint = words::did_you_mean(key, known.iter().map(String::as_str).chain(["default_mm"]));
-                return Err(wrong(key, format!("{key} is neither default_mm nor the name of a marker with _mm{hint}")));
+                return Err(wrong(
+                    &[Part::Key("noise"), Part::Key(key)],
+                    format!("{key} is neither default_mm nor the name of a marker with _mm{hint}"),
+                ));
             }
-            if !(value.is_finite() && *value > 0.0) {
-                return Err(wrong(key, format!("{key} is {}, but must be positive", words::number(*value))));
+            if !NOISE_MM.contains(value) {
+                let [value, low, high] = [value, NOISE_MM.start(), NOISE_MM.end()].map(|x| words::number(*x));
+                let reason = format!("{key} is {value}, but must be positive: between {low} and {high}");
+                return Err(wrong(&[Part::Key("noise"), Part::Key(key)], reason));
             }
         }
         for marker in &markers {
@@ -238,41 +265,103 @@ impl Dataset {
             noise.extend([own, own]);
         }
         let mut runs: Vec<MeasuredRun> = Vec::new();
-        for entry in &description.run {
+        for (index, entry) in description.run.iter().enumerate() {
+            let at = |key: &'static str| [Part::Key("run"), Part::Index(index), Part::Key(key)];
+            if entry.id.trim().is_empty() {
+                return Err(wrong(&at("id"), "id is empty; every run needs a name".into()));
+            }
             if runs.iter().any(|run| run.id == entry.id) {
-                return Err(wrong(&format!("id = \"{}\"", entry.id), format!("two runs are called {}", entry.id)));
+                return Err(wrong(&at("id"), format!("id: two runs are called {:?}", entry.id)));
             }
             let file = path.parent().unwrap_or(Path::new("")).join(&entry.file);
             let (times, voltages, channels, remarks) = read_run(&file, &robot, &markers)?;
-            runs.push(MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks });
+            let run = MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks };
+            runs.push(run.checked(&robot)?);
         }
-        for observation in &description.observation {
-            if !definitions::names().contains(&observation.measure.as_str()) {
-                let reason = words::not_one_of(&observation.measure, &definitions::names());
-                return Err(wrong(&format!("measure = \"{}\"", observation.measure), format!("measure: {reason}")));
+        let mut observations = description.observation;
+        for (index, observation) in observations.iter_mut().enumerate() {
+            if let Some(file) = &mut observation.drive.file {
+                *file = path.parent().unwrap_or(Path::new("")).join(&*file);
             }
-            if !(observation.sigma.is_finite() && observation.sigma > 0.0 && observation.value.is_finite()) {
-                return Err(wrong(
-                    "[[observation]]",
-                    format!("{}: value and sigma must be numbers, sigma positive", observation.measure),
-                ));
-            }
+            observations::check(&nominal, observation).map_err(|error| match error {
+                Fault::At { key, message } => {
+                    let way: Vec<Part> =
+                        [Part::Key("observation"), Part::Index(index)].into_iter().chain(key.split('.').map(Part::Key)).collect();
+                    fault(path, &text, &way, &format!("observation {}: {key}", index + 1), message)
+                }
+                Fault::Other(error) => error.into(),
+            })?;
         }
         let name = if description.dataset.name.is_empty() {
             path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
         } else {
             description.dataset.name
         };
-        Ok(Self {
-            name,
-            about: description.dataset.about,
-            nominal,
-            robot,
-            markers,
-            noise,
-            runs,
-            observations: description.observation,
-        })
+        Ok(Self { name, about: description.dataset.about, nominal, robot, markers, noise, runs, observations })
+    }
+}
+
+/// A step on the way to a value in a description.
+#[derive(Debug, Clone, Copy)]
+enum Part<'a> {
+    Key(&'a str),
+    Index(usize),
+}
+
+/// Line (from 1) of the deepest part of the way that the text has.
+fn line_of(text: &str, way: &[Part]) -> u64 {
+    let Ok(parsed) = DeTable::parse(text) else { return 1 };
+    let mut at: Option<&DeValue> = None;
+    let mut offset = 0;
+    let first = parsed.get_ref();
+    for part in way {
+        let next = match (part, at) {
+            (Part::Key(key), None) => first.iter().find(|(name, _)| name.get_ref().as_ref() == *key),
+            (Part::Key(key), Some(DeValue::Table(table))) => table.iter().find(|(name, _)| name.get_ref().as_ref() == *key),
+            (Part::Index(index), Some(DeValue::Array(array))) => {
+                let Some(item) = array.iter().nth(*index) else { break };
+                (offset, at) = (item.span().start, Some(item.get_ref()));
+                continue;
+            }
+            _ => None,
+        };
+        let Some((name, value)) = next else { break };
+        (offset, at) = (name.span().start, Some(value.get_ref()));
+    }
+    text[..offset].matches('\n').count() as u64 + 1
+}
+
+/// A value of a description that makes no sense: a usage error.
+fn fault(path: &Path, text: &str, way: &[Part], key: &str, message: impl Into<String>) -> DataError {
+    let place = format!("{}, line {}", path.display(), line_of(text, way));
+    ConfigError::Value { place, key: key.into(), message: message.into() }.into()
+}
+
+impl MeasuredRun {
+    /// The run, if its rows make a run that can be simulated and its voltages are known between rows.
+    fn checked(mut self, robot: &Robot) -> Result<Self, DataError> {
+        let bad =
+            |reason: String| DataError::Unreadable { path: self.path.clone(), reason: format!("run {}: {reason}", self.id) };
+        let duration = self.times[self.times.len() - 1] - self.times[0];
+        let steps = duration / robot::step(robot, &self.times);
+        if steps > MOST_STEPS {
+            return Err(bad(format!(
+                "{duration} s in steps that suit the robot and the rows are {steps:.1e} steps, more than {MOST_STEPS:.0e}; is t_s in seconds?"
+            )));
+        }
+        if let Some(reason) = voltage::too_coarse(&self.times, &self.voltages, robot.actuators) {
+            return Err(bad(reason));
+        }
+        let rate = (self.times.len() - 1) as f64 / duration;
+        let first = analytic::cantilever_frequency(robot) / (robot.actuators as f64).powi(2);
+        if robot.mount == Mount::Clamped && rate < 2.0 * first {
+            self.remarks.push(format!(
+                "{rate:.1} rows per second show a drive of more than {:.1} Hz as a slower one, and the robot's first mode is at {first:.1} Hz; if it was \
+                 driven that fast, record the voltage ten times per period",
+                0.5 * rate
+            ));
+        }
+        Ok(self)
     }
 }
 
@@ -288,10 +377,8 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
         match error {
             // The lines are those of the description, not of the experiment made of it.
             ConfigError::Value { key, message, .. } => {
-                let name = key.rsplit('.').next().unwrap_or(&key);
-                let line =
-                    text.lines().position(|line| line.trim_start().starts_with(name)).map(|at| format!(", line {}", at + 1));
-                ConfigError::Value { place: format!("{}{}", path.display(), line.unwrap_or_default()), key, message }
+                let way: Vec<Part> = key.split('.').map(Part::Key).collect();
+                ConfigError::Value { place: format!("{}, line {}", path.display(), line_of(text, &way)), key, message }
             }
             other => other,
         }
@@ -374,27 +461,43 @@ fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunDa
                 wrong(line, column + 1, format!("{}: {text:?} is not a number", headers.get(column).unwrap_or_default()))
             })
         };
-        let time = number(time_column)?;
-        if times.last().is_some_and(|last| time <= *last) {
+        let within = |column: usize, most: f64, unit: &str| {
+            let value = number(column)?;
+            if value.abs() <= most {
+                return Ok(value);
+            }
+            let name = headers.get(column).unwrap_or_default();
+            Err(wrong(line, column + 1, format!("{name} is {}, beyond {most:.0} {unit}; is it in {unit}?", words::number(value))))
+        };
+        let time = within(time_column, MOST_SECONDS, "s")?;
+        if times.last().is_some_and(|last| time - last < LEAST_SECONDS) {
+            let last = times[times.len() - 1];
             return Err(wrong(
                 line,
                 time_column + 1,
-                format!("t_s is {} after {}; times must rise", words::number(time), words::number(times[times.len() - 1])),
+                format!(
+                    "t_s is {} after {}; times must rise, by {LEAST_SECONDS:e} s at least",
+                    words::number(time),
+                    words::number(last)
+                ),
             ));
         }
         times.push(time);
         for &column in &volt_columns {
-            voltages.push(number(column)?);
+            voltages.push(within(column, MOST_VOLTS, "V")?);
         }
         for (channel, column) in channels.iter_mut().zip(&columns) {
             if let Some(column) = *column {
                 let empty = record.get(column).unwrap_or_default().is_empty();
-                channel.push(if empty { f64::NAN } else { number(column)? });
+                channel.push(if empty { f64::NAN } else { within(column, MOST_MM, "mm")? });
             }
         }
     }
     if times.is_empty() {
         return Err(wrong(1, 0, "there are no rows below the header".into()));
+    }
+    if times.len() == 1 {
+        return Err(wrong(2, 0, "there is one row; a run needs two at least".into()));
     }
     if channels.iter().flatten().all(|value| value.is_nan()) {
         return Err(wrong(2, 0, "all values of all markers are missing".into()));

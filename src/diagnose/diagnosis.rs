@@ -33,6 +33,18 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
+impl Estimate {
+    /// Name, value, range and unit.
+    pub(super) fn words(&self) -> String {
+        let range = match self.ci95 {
+            [Some(low), Some(high)] if low == high => return format!("{} = {}", self.name, self.value),
+            [Some(low), Some(high)] => format!(" ({low:.4} to {high:.4})"),
+            _ => String::new(),
+        };
+        format!("{} = {:.4}{range}{}{}", self.name, self.value, if self.unit.is_empty() { "" } else { " " }, self.unit)
+    }
+}
+
 /// A cause that the data ask for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adopted {
@@ -153,18 +165,7 @@ pub(super) fn summary(
 ) -> String {
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let name = |effect: &Adopted| {
-        let numbers: Vec<_> = effect
-            .parameters
-            .iter()
-            .map(|p| {
-                let range = match p.ci95 {
-                    [Some(low), Some(high)] if low == high => return format!("{} = {}", p.name, p.value),
-                    [Some(low), Some(high)] => format!(" ({low:.4} to {high:.4})"),
-                    _ => String::new(),
-                };
-                format!("{} = {:.4}{range}{}{}", p.name, p.value, if p.unit.is_empty() { "" } else { " " }, p.unit)
-            })
-            .collect();
+        let numbers: Vec<_> = effect.parameters.iter().map(Estimate::words).collect();
         format!("{} ({})", effect.id, numbers.join(", "))
     };
     let physics: Vec<&Adopted> = effects.iter().filter(|effect| effect.id != "discretisation").collect();

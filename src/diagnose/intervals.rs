@@ -14,6 +14,8 @@ const CHI2_95: f64 = 3.841_458_820_694_124;
 pub(super) struct Intervals {
     /// Per coordinate, in order: lower and upper end, in coordinates.
     pub ends: Vec<[f64; 2]>,
+    /// How much larger than for independent noise the variance of each coordinate is.
+    pub inflation: Vec<f64>,
     /// Number of coordinates of each term.
     pub sizes: Vec<usize>,
     /// Those that the data hardly tell apart.
@@ -69,7 +71,7 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
         }
     }
     let sizes = model.terms.iter().map(|term| term.x.len()).collect();
-    Ok(Intervals { ends, sizes, correlations, condition: condition(&scored.fit.information) })
+    Ok(Intervals { ends, inflation, sizes, correlations, condition: condition(&scored.fit.information) })
 }
 
 /// The model with coordinate `k` at `to` and all others where they would be best if the model were linear, within their bounds.

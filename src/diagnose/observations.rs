@@ -7,9 +7,12 @@ use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Ve
 use super::fit::{Bench, Care, Fit};
 use super::plant::{Candidate, Model, Plant, Signal, Term};
 use super::robot;
-use crate::experiment::{self, Config, Control, EffectConfig, Source};
+use crate::experiment::{self, Config, ConfigError, Control, EffectConfig, Source};
+use crate::model::Mount;
+use crate::recording::definitions;
 use crate::recording::measures::Measures;
 use crate::view::escape;
+use crate::words;
 
 /// A model explains the numbers if each lies within two standard deviations, in the mean.
 const EXPLAINED: f64 = 4.0;
@@ -17,6 +20,9 @@ const EXPLAINED: f64 = 4.0;
 const DURATION: f64 = 2.0;
 const STEP: f64 = 2e-4;
 const RECORD: f64 = 1e-3;
+
+/// Most time steps of a number's run.
+const MOST_STEPS: f64 = 2e7;
 
 /// Numbers as a plant: every number is a run with one value.
 struct Numbers<'a> {
@@ -26,7 +32,7 @@ struct Numbers<'a> {
 }
 
 /// The experiment behind a number. A resonance that is driven by a sine without frequency is taken from how a step rings.
-fn config(dataset: &Dataset, observation: &Observation) -> Result<Config, String> {
+fn config(nominal: &Config, observation: &Observation) -> Result<Config, String> {
     let merged = |own: toml::Value, over: toml::Value| match (own, over) {
         (toml::Value::Table(mut own), toml::Value::Table(over)) => {
             own.extend(over);
@@ -36,9 +42,8 @@ fn config(dataset: &Dataset, observation: &Observation) -> Result<Config, String
     };
     let text = |error: &dyn std::fmt::Display| format!("{}: {error}", observation.measure);
     let value = |v: Result<toml::Value, toml::ser::Error>| v.map_err(|error| text(&error));
-    let robot = merged(value(toml::Value::try_from(&dataset.nominal.robot))?, value(toml::Value::try_from(&observation.robot))?);
-    let material =
-        merged(value(toml::Value::try_from(&dataset.nominal.material))?, value(toml::Value::try_from(&observation.material))?);
+    let robot = merged(value(toml::Value::try_from(&nominal.robot))?, value(toml::Value::try_from(&observation.robot))?);
+    let material = merged(value(toml::Value::try_from(&nominal.material))?, value(toml::Value::try_from(&observation.material))?);
     let mut config = Config {
         robot: robot.try_into().map_err(|error: toml::de::Error| text(&error))?,
         material: material.try_into().map_err(|error: toml::de::Error| text(&error))?,
@@ -68,6 +73,76 @@ fn config(dataset: &Dataset, observation: &Observation) -> Result<Config, String
     Ok(config)
 }
 
+/// What is wrong with an observation.
+pub(super) enum Fault {
+    /// A value, by its key within the observation.
+    At {
+        /// The key.
+        key: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A file that it names.
+    Other(ConfigError),
+}
+
+impl Fault {
+    fn at(key: &str, message: impl Into<String>) -> Self {
+        Self::At { key: key.into(), message: message.into() }
+    }
+}
+
+/// Whether an observation makes sense: its measure can be had from its mount and drive, and its experiment can be run.
+pub(super) fn check(nominal: &Config, observation: &Observation) -> Result<(), Fault> {
+    let measure = observation.measure.as_str();
+    if !definitions::names().contains(&measure) {
+        return Err(Fault::at("measure", words::not_one_of(measure, &definitions::names())));
+    }
+    if !observation.value.is_finite() {
+        return Err(Fault::at("value", format!("is {}, but must be a number", observation.value)));
+    }
+    if !(observation.sigma.is_finite() && observation.sigma > 0.0) {
+        return Err(Fault::at("sigma", format!("is {}, but must be a positive number", observation.sigma)));
+    }
+    let config = config(nominal, observation).map_err(|message| Fault::at("measure", message))?;
+    let text = toml::to_string(&config).map_err(|error| Fault::at("measure", error.to_string()))?;
+    let experiment = experiment::check(&Source::from_text(measure, text)).map_err(|error| match error {
+        ConfigError::Value { key, message, .. } => Fault::At { key, message },
+        other => Fault::Other(other),
+    })?;
+    if experiment.steps as f64 > MOST_STEPS {
+        let message =
+            format!("the run has {} steps, more than {MOST_STEPS:.0e}, and a diagnosis needs hundreds of runs", experiment.steps);
+        return Err(Fault::at("simulation", message));
+    }
+    let (mount, repeats) = (experiment.robot.mount, experiment.drive.period().is_some());
+    let refused = match measure {
+        "energy_error" => Some("is known to a run only, no camera measures it"),
+        "tip_deflection_mm"
+        | "tip_amplitude_mm"
+        | "tip_phase_deg"
+        | "resonance_hz"
+        | "damping_ratio"
+        | "half_power_bandwidth_hz"
+            if mount != Mount::Clamped =>
+        {
+            Some("is a measure of clamped robots; set mount = \"clamped\"")
+        }
+        "jump_height_mm" | "speed_mm_s" | "displacement_sum_mm" | "stride_mm" | "period_ratio" | "mid_end_phase_deg"
+            if mount == Mount::Clamped =>
+        {
+            Some("is no measure of a clamped robot")
+        }
+        "body_touching" | "end_touching" | "aerial" if mount != Mount::Ground => Some("is a measure of robots on the ground"),
+        "tip_phase_deg" | "stride_mm" | "period_ratio" | "mid_end_phase_deg" if !repeats => Some("needs a drive with a period"),
+        "resonance_hz" | "damping_ratio" | "half_power_bandwidth_hz" if repeats => {
+            Some("is taken from how the tip rings after a step: give a step, or for resonance_hz a sine without frequency_hz")
+        }
+        _ => None,
+    };
+    refused.map_or(Ok(()), |why| Err(Fault::at("measure", format!("{measure} {why}"))))
+}
+
 impl Plant for Numbers<'_> {
     fn signals(&self) -> &[Signal] {
         &self.signals
@@ -87,7 +162,7 @@ impl Plant for Numbers<'_> {
 
     fn predict(&self, model: &Model, run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
         let observation = &self.dataset.observations[run];
-        let mut config = config(self.dataset, observation)?;
+        let mut config = config(&self.dataset.nominal, observation)?;
         for term in &model.terms {
             let candidate = &self.candidates[term.candidate];
             let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name.to_owned(), p.value(*x)));
@@ -111,11 +186,6 @@ impl Plant for Numbers<'_> {
 /// # Errors
 /// If the nominal model cannot be simulated, in words.
 pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<Diagnosis, String> {
-    for observation in &dataset.observations {
-        if !Measures::names().contains(&observation.measure) {
-            return Err(format!("there is no measure {}; choose from {}", observation.measure, Measures::names().join(", ")));
-        }
-    }
     let signals = dataset.observations.iter().enumerate().map(|(index, o)| Signal {
         id: format!("{}-{}", index + 1, o.measure),
         values: vec![o.value],

@@ -121,5 +121,5 @@ pub fn separate(plant: &RobotPlant, models: &[Model]) -> Option<String> {
                 .into(),
         );
     }
-    Some(format!("{text}: the tied models then differ by {apart:.0} standard deviations"))
+    Some(format!("{text}: the models then differ by {apart:.0} standard deviations"))
 }

@@ -201,7 +201,7 @@ impl RobotPlant {
 }
 
 /// A step that fits whole into the rows' interval, if they are even.
-fn step(robot: &Robot, times: &[f64]) -> f64 {
+pub(super) fn step(robot: &Robot, times: &[f64]) -> f64 {
     let longest = match robot.mount {
         Mount::Clamped => 1.0 / (STEPS_PER_PERIOD * analytic::cantilever_frequency(robot) / (robot.actuators as f64).powi(2)),
         _ => GROUND_STEP,

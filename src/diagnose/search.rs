@@ -70,6 +70,11 @@ impl Scored {
         self.held + self.fitted
     }
 
+    /// χ² per value above 1, of `count` values in all runs.
+    pub(super) fn above(&self, count: usize) -> f64 {
+        (self.total() / count as f64 - 1.0).max(0.0)
+    }
+
     /// The model.
     pub fn model(&self) -> &Model {
         &self.fit.model

@@ -32,19 +32,33 @@ struct Trace {
     values: Vec<f64>,
 }
 
-/// The channel with the largest residual.
-fn trace(signal: &Signal, residuals: &[f64]) -> Trace {
-    let channels = signal.channels.iter().copied().max().unwrap_or(0) + 1;
-    let size = |channel: usize| -> f64 {
-        residuals.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(r, _)| r * r).sum()
-    };
-    let chosen = (0..channels).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0);
-    let rows: Vec<usize> = (0..residuals.len()).filter(|i| signal.channels[*i] == chosen).collect();
-    Trace {
+/// Fewest values that are tested.
+const LEAST: usize = 20;
+
+/// Which rows of each channel count.
+fn rows_by_channel(signal: &Signal, used: &[bool]) -> Vec<Vec<usize>> {
+    let channels = signal.channels.iter().copied().max().map_or(0, |most| most + 1);
+    let mut rows = vec![Vec::new(); channels];
+    for (i, channel) in signal.channels.iter().enumerate().filter(|(i, _)| used[*i]) {
+        rows[*channel].push(i);
+    }
+    rows
+}
+
+/// The channel with the largest residual of those with enough values, without values that were left out; and the channel with most values, whose
+/// times and inputs do not depend on the residuals. What is computed from a trace must not depend on its size, by which it is chosen.
+fn trace(signal: &Signal, used: &[bool], residuals: &[f64]) -> Option<[Trace; 2]> {
+    let mut rows = rows_by_channel(signal, used);
+    rows.retain(|rows| rows.len() >= LEAST);
+    let size =
+        |rows: &&Vec<usize>| -> f64 { rows.iter().map(|i| residuals[*i] * residuals[*i]).sum::<f64>() / rows.len() as f64 };
+    let chosen = rows.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let longest = rows.iter().max_by_key(|rows| rows.len())?;
+    Some([chosen, longest].map(|rows| Trace {
         times: rows.iter().map(|i| signal.times[*i]).collect(),
         inputs: rows.iter().map(|i| signal.inputs[*i]).collect(),
         values: rows.iter().map(|i| residuals[*i]).collect(),
-    }
+    }))
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -91,17 +105,80 @@ pub fn input_frequency(times: &[f64], inputs: &[f64]) -> Option<f64> {
     (count >= 3).then(|| (count - 1) as f64 / (rises[count - 1] - rises[0]))
 }
 
-/// All tests on all runs, and those across runs.
-pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals]) -> Vec<ResidualTest> {
-    let mut tests = Vec::new();
-    let (mut swings, mut gains) = (Vec::new(), Vec::new());
-    for run in split.all() {
-        let signal = &plant.signals()[run];
-        let r = &residuals[run];
-        if r.len() < 20 {
-            continue;
+/// The standard normal variable that noise exceeds, on either side, in one case of a thousand, and on one side.
+const Z_TWO_SIDED: f64 = 3.290_526_731_491_9;
+const Z_ONE_SIDED: f64 = 3.090_232_306_167_8;
+
+/// Student's t that noise exceeds, on either side, in one case of a thousand: Cornish and Fisher's expansion (M. Abramowitz and I. A. Stegun,
+/// 26.7.5), right to 10⁻³ from 17 degrees of freedom on.
+fn student(freedom: f64) -> f64 {
+    let (z, n) = (Z_TWO_SIDED, freedom);
+    let [z3, z5, z7] = [3, 5, 7].map(|power| z.powi(power));
+    z + (z3 + z) / (4.0 * n)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n * n * n)
+}
+
+/// The coefficient of correlation that noise exceeds in one case of a thousand.
+fn correlation_limit(values: usize) -> f64 {
+    let freedom = values as f64 - 2.0;
+    let t = student(freedom);
+    t / (freedom + t * t).sqrt()
+}
+
+/// χ² per value that noise exceeds in one case of a thousand, by Wilson and Hilferty's approximation.
+fn chi2_limit(values: f64) -> f64 {
+    let spread = 2.0 / (9.0 * values);
+    (1.0 - spread + Z_ONE_SIDED * spread.sqrt()).powi(3)
+}
+
+/// Amplitude of a series at a frequency beside a mean, by least squares, with the amplitude that noise of the strength of the rest exceeds in one case of
+/// a thousand: √(2 S/m) with S the sum of squares that the sine takes of m values; of k = 2 coordinates (1 where sine and cosine are alike at the
+/// rows) S/k over the mean square of the rest has Fisher's distribution.
+fn harmonic(trace: &Trace, frequency: f64) -> (f64, f64) {
+    let m = trace.values.len() as f64;
+    let centred = |mut values: Vec<f64>| {
+        let mean = mean(&values);
+        values.iter_mut().for_each(|v| *v -= mean);
+        values
+    };
+    let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let phases = trace.times.iter().map(|t| 2.0 * PI * frequency * (t - trace.times[0]));
+    let (cos, sin): (Vec<f64>, Vec<f64>) = phases.map(|phase| (phase.cos(), phase.sin())).unzip();
+    let values = centred(trace.values.clone());
+    let (mut taken, mut basis): (f64, Vec<Vec<f64>>) = (0.0, Vec::new());
+    for wave in [centred(cos), centred(sin)] {
+        let mut rest = wave;
+        for other in &basis {
+            let along = inner(&rest, other);
+            rest.iter_mut().zip(other).for_each(|(rest, other)| *rest -= along * other);
         }
-        let n = r.len() as f64;
+        let size = inner(&rest, &rest).sqrt();
+        if size * size > 1e-6 * m {
+            rest.iter_mut().for_each(|rest| *rest /= size);
+            taken += inner(&rest, &values).powi(2);
+            basis.push(rest);
+        }
+    }
+    let k = basis.len() as f64;
+    let freedom = m - 1.0 - k;
+    let left = (inner(&values, &values) - taken).max(0.0) / freedom;
+    let limit = match basis.len() {
+        0 => return (0.0, 0.0),
+        1 => student(freedom).powi(2),
+        _ => freedom * (1000_f64.powf(2.0 / freedom) - 1.0),
+    };
+    ((2.0 * taken / m).sqrt(), (2.0 * limit * left / m).sqrt())
+}
+
+/// All tests on all runs, and those across runs, on the values that are `used`. Which tests there are does not depend on the residuals.
+pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<ResidualTest> {
+    let mut tests = Vec::new();
+    let (mut gains, mut runs) = (Vec::new(), 0);
+    for run in split.all() {
+        let (signal, used, r) = (&plant.signals()[run], &used[run], &residuals[run]);
+        let Some([trace, longest]) = trace(signal, used, r) else { continue };
+        runs += 1;
         let mut add = |name: &str, statistic: f64, limit: f64, good: &str, bad: &str| {
             let passed = statistic.abs() <= limit;
             tests.push(ResidualTest {
@@ -113,21 +190,22 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
                 meaning: if passed { good } else { bad }.into(),
             });
         };
-        let chi2 = r.iter().map(|r| r * r).sum::<f64>() / n;
-        add("chi-square per value", chi2, 1.0 + 3.1 * (2.0 / n).sqrt(), "as large as the noise", "larger than the noise");
-        let trace = trace(signal, r);
-        let m = trace.values.len() as f64;
-        let limit = 3.3 / m.sqrt();
-        let lag = correlation(&trace.values[..trace.values.len() - 1], &trace.values[1..]);
-        add("correlation of neighbours", lag, limit, "white", "neighbours are alike: structure is left");
+        let n = used.iter().filter(|used| **used).count() as f64;
+        let chi2 = r.iter().zip(used).filter(|(_, used)| **used).map(|(r, _)| r * r).sum::<f64>() / n;
+        add("chi-square per value", chi2, chi2_limit(n), "as large as the noise", "larger than the noise");
+        let m = trace.values.len();
+        let lag = correlation(&trace.values[..m - 1], &trace.values[1..]);
+        add("correlation of neighbours", lag, correlation_limit(m - 1), "white", "neighbours are alike: structure is left");
         let along = correlation(&trace.values, &trace.inputs);
+        let limit = correlation_limit(m);
         add("correlation with the input", along, limit, "independent of the input", "follows the input: a gain is off");
-        let rates: Vec<f64> = trace.inputs.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let ends = trace.inputs.windows(2).zip(trace.times.windows(2));
+        let rates: Vec<f64> = ends.map(|(u, t)| (u[1] - u[0]) / (t[1] - t[0])).collect();
         let beside = correlation(&trace.values[1..], &rates);
         add(
             "correlation with the input's rate",
             beside,
-            limit,
+            correlation_limit(m - 1),
             "independent of the rate",
             "follows the rate of the input: a lag, a loop or a loss is off",
         );
@@ -140,54 +218,32 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
             "does not drift",
             "drifts with the logarithm of time: creep, or a set-up that moves",
         );
-        if let Some(frequency) = input_frequency(&trace.times, &trace.inputs) {
-            // An amplitude of noise of unit variance is about √(π/m); one in a thousand is above √(4 ln 1000/m).
-            let limit = (4.0 * 1000_f64.ln() / m).sqrt();
-            for (harmonic, odd) in [(2.0, false), (3.0, true)] {
-                let size = amplitude(&trace.times, &trace.values, harmonic * frequency);
-                let (name, bad) = if odd {
-                    ("third harmonic", "an odd distortion: a gain, stiffness or loss that depends on amplitude")
-                } else {
-                    ("second harmonic", "an even distortion: the two directions differ")
-                };
+        if let Some(frequency) = input_frequency(&longest.times, &longest.inputs) {
+            for (times, name, bad) in [
+                (2.0, "second harmonic", "an even distortion: the two directions differ"),
+                (3.0, "third harmonic", "an odd distortion: a gain, stiffness or loss that depends on amplitude"),
+            ] {
+                let (size, limit) = harmonic(&trace, times * frequency);
                 add(name, size, limit, "no distortion", bad);
             }
-            let area = loop_area(&trace);
-            add(
-                "loop area",
-                area,
-                3.3 * (0.5 / m).sqrt(),
-                "no loop over the input",
-                "a loop over the input: loss, lag or memory",
-            );
+            let (area, limit) = loop_area(&trace);
+            add("loop area", area, limit, "no loop over the input", "a loop over the input: loss, lag or memory");
         }
-        let measured: Vec<f64> = {
-            let rows: Vec<usize> = (0..r.len()).collect();
-            rows.iter().map(|i| signal.values[*i] / signal.sigmas[*i]).collect()
-        };
-        let predicted: Vec<f64> = measured.iter().zip(r).map(|(y, r)| y - r).collect();
-        let swing = trace.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), u| (l.min(*u), h.max(*u)));
-        let spread: f64 = centred(signal, &predicted).iter().map(|v| v * v).sum();
-        if spread > 0.0 {
-            let product: f64 = centred(signal, &predicted).iter().zip(&centred(signal, &measured)).map(|(a, b)| a * b).sum();
-            gains.push((product / spread, 1.0 / spread.sqrt()));
-            swings.push(swing.1 - swing.0);
-        }
+        gains.extend(gain(signal, used, r));
     }
-    if gains.len() >= 3 {
-        let ratios: Vec<f64> = gains.iter().map(|(gain, _)| *gain).collect();
-        let trend = correlation(&ratios, &swings);
-        let worst = gains.iter().map(|(gain, error)| (gain - 1.0).abs() / error).fold(0.0, f64::max);
+    if runs >= 3 {
+        let trend = trend(&gains);
+        let passed = trend.abs() <= Z_TWO_SIDED;
         tests.push(ResidualTest {
             name: "gain against amplitude".into(),
             run: "all".into(),
             statistic: trend,
-            limit: (3.3 / (ratios.len() as f64).sqrt()).min(0.9),
-            passed: worst < 4.0 || trend.abs() < (3.3 / (ratios.len() as f64).sqrt()).min(0.9),
-            meaning: if worst < 4.0 {
-                "the same gain in all runs"
+            limit: Z_TWO_SIDED,
+            passed,
+            meaning: if passed {
+                "no trend of the gain with the input's swing"
             } else {
-                "measured over simulated motion, correlated with the input's swing"
+                "measured over simulated motion changes with the input's swing (in standard errors)"
             }
             .into(),
         });
@@ -195,50 +251,78 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, residuals: &[Residuals])
     tests
 }
 
-/// Values less the mean of their channel.
-fn centred(signal: &Signal, values: &[f64]) -> Vec<f64> {
-    let channels = signal.channels.iter().copied().max().unwrap_or(0) + 1;
-    let means: Vec<f64> = (0..channels)
-        .map(|channel| {
-            mean(&values.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(v, _)| *v).collect::<Vec<_>>())
-        })
-        .collect();
-    values.iter().zip(&signal.channels).map(|(v, channel)| v - means[*channel]).collect()
+/// The input's swing, measured over simulated motion about its mean, and the reciprocal variance of that: by least squares, for noise of unit variance.
+fn gain(signal: &Signal, used: &[bool], residuals: &[f64]) -> Option<[f64; 3]> {
+    let (mut product, mut spread) = (0.0, 0.0);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for rows in rows_by_channel(signal, used) {
+        let predicted: Vec<f64> = rows.iter().map(|i| signal.values[*i] / signal.sigmas[*i] - residuals[*i]).collect();
+        let mean = mean(&predicted);
+        for (i, predicted) in rows.iter().zip(&predicted) {
+            product += (predicted - mean) * residuals[*i];
+            spread += (predicted - mean).powi(2);
+            low = low.min(signal.inputs[*i]);
+            high = high.max(signal.inputs[*i]);
+        }
+    }
+    (spread > 0.0).then(|| [high - low, 1.0 + product / spread, spread])
 }
 
-/// Mean of the residual's part in quadrature with the input's swing: ∮ r du, scaled to unit swing and per row.
-fn loop_area(trace: &Trace) -> f64 {
-    let (low, high) = trace.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), u| (l.min(*u), h.max(*u)));
-    let half = 0.5 * (high - low).max(1e-9);
-    let steps: Vec<f64> = trace.inputs.windows(2).map(|pair| (pair[1] - pair[0]) / half).collect();
-    let size = (steps.iter().map(|s| s * s).sum::<f64>() / steps.len().max(1) as f64).sqrt().max(1e-12);
-    let product: f64 = trace.values.windows(2).zip(&steps).map(|(r, s)| 0.5 * (r[0] + r[1]) * s / size).sum();
-    product / steps.len().max(1) as f64
+/// Slope of the gains over the swings by weighted least squares, in its standard errors; 0 where all swings are alike.
+fn trend(gains: &[[f64; 3]]) -> f64 {
+    let weight: f64 = gains.iter().map(|[_, _, w]| w).sum();
+    let middle = gains.iter().map(|[swing, _, w]| w * swing).sum::<f64>() / weight;
+    let (mut along, mut size) = (0.0, 0.0);
+    for [swing, gain, w] in gains {
+        // The mean gain drops out: deviations from the middle add up to nothing.
+        along += w * (swing - middle) * (gain - 1.0);
+        size += w * (swing - middle).powi(2);
+    }
+    let largest = gains.iter().fold(0.0_f64, |most, [swing, ..]| most.max(swing.abs()));
+    if size > 1e-12 * weight * largest * largest { along / size.sqrt() } else { 0.0 }
+}
+
+/// Mean of the residual's part in quadrature with the input's swing, ∮ r du scaled to unit steps of the input and per row; and what noise of the residual's
+/// strength exceeds in one case of a thousand. A row counts with half of the steps before and after it.
+fn loop_area(trace: &Trace) -> (f64, f64) {
+    let steps: Vec<f64> = trace.inputs.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let rows = steps.len().max(1) as f64;
+    let size = (steps.iter().map(|s| s * s).sum::<f64>() / rows).sqrt();
+    if size == 0.0 {
+        return (0.0, 0.0);
+    }
+    let beside = |i: usize| 0.5 * (i.checked_sub(1).map_or(0.0, |k| steps[k]) + steps.get(i).copied().unwrap_or(0.0)) / size;
+    let weights: Vec<f64> = (0..trace.values.len()).map(beside).collect();
+    let spread = |values: &[f64]| {
+        let mean = mean(values);
+        values.iter().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt()
+    };
+    let both = spread(&trace.values) * spread(&weights) / rows;
+    (correlation(&trace.values, &weights) * both, correlation_limit(trace.values.len()) * both)
 }
 
 /// What unexplained residuals look like, in words.
-pub fn describe(plant: &dyn Plant, split: &Split, residuals: &[Residuals]) -> Vec<String> {
+pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<String> {
     let mut words = Vec::new();
     let all = split.all();
     let signals = plant.signals();
-    let excess = |run: usize| (residuals[run].iter().map(|r| r * r).sum::<f64>() - residuals[run].len() as f64).max(0.0);
+    // Residuals of values that are left out are 0.
+    let count = |run: usize| used[run].iter().filter(|used| **used).count() as f64;
+    let excess = |run: usize| (residuals[run].iter().map(|r| r * r).sum::<f64>() - count(run)).max(0.0);
     let whole: f64 = all.iter().map(|run| excess(*run)).sum();
     let mut order = all.clone();
     order.sort_by(|a, b| excess(*b).total_cmp(&excess(*a)));
     let worst: Vec<usize> = order.iter().copied().filter(|run| excess(*run) > 0.1 * whole).collect();
     let share = |run: &usize| format!("{} ({:.0} %)", signals[*run].id, 100.0 * excess(*run) / whole.max(1e-9));
     words.push(format!("where: {}", worst.iter().map(share).collect::<Vec<_>>().join(", ")));
-    let clean = all.iter().filter(|run| excess(**run) < 0.3 * residuals[**run].len() as f64).count();
+    let clean = all.iter().filter(|run| excess(**run) < 0.3 * count(**run)).count();
     if clean > 0 {
         words.push(format!("{clean} of {} runs are explained to the noise", all.len()));
     }
     for run in worst.iter().take(4) {
-        let trace = trace(&signals[*run], &residuals[*run]);
+        let Some([trace, _]) = trace(&signals[*run], &used[*run], &residuals[*run]) else { continue };
         let id = &signals[*run].id;
         let n = trace.values.len();
-        if n < 20 {
-            continue;
-        }
         let m = mean(&trace.values);
         let rms = (trace.values.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt();
         // A frequency: the largest of a periodogram up to a quarter of the sampling rate.

@@ -2,7 +2,7 @@
 
 use super::dataset::Role;
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict, summary};
-use super::fit::{Bench, Residuals};
+use super::fit::{BLOCK, Bench, Residuals};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::plant::{Model, Plant, Term};
 use super::search::{Scored, Search, Split, Trial, split};
@@ -20,6 +20,13 @@ const LEFT_SHARE: f64 = 0.02;
 const NOTHING_NAMED: f64 = 0.5;
 /// Replacements are looked at again, at the full precision, if their χ² is above the best one's by no more than this.
 const NEAR_TIE: f64 = 500.0;
+/// χ² of one, two, ... degrees of freedom that noise exceeds in 5 % of cases.
+const CHI2_95: [f64; 4] = [3.841, 5.991, 7.815, 9.488];
+/// Fewest values to fit and to judge by: two blocks and one of those that structure of the residuals may extend over.
+const LEAST_FITTED: usize = 2 * BLOCK;
+const LEAST_HELD: usize = BLOCK;
+/// What to measure where there is too little.
+const MORE_RUNS: &str = "measure three runs or more under voltages of different size and speed, with a hundred rows each or more";
 
 /// The diagnosis with the models behind it, for figures and for going on.
 pub struct Outcome {
@@ -70,48 +77,27 @@ pub fn diagnose(
         calibrated = search.calibrated(start)?;
     }
     let poor = poverty(plant, &search.split);
-    let Causes { mut best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, poor.is_some())?;
+    let Causes { best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, poor.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
     }
 
     // Refined, but without any cause: what the causes have to explain.
     let bare = search.fitted(&Model { terms: Vec::new(), resolution: best.model().resolution, fine: true })?;
-    let all = search.split.all();
-    let count = search.bench.count(&all) as f64;
-    let above = |scored: &Scored| (scored.total() / count - 1.0).max(0.0);
-    let (left, whole) = (above(&best), above(&bare));
-    let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
-    let handful = best.model().terms.len().max(2) as f64 - 1.0;
-    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / handful;
-    let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
-    if unnamed && !best.model().terms.is_empty() {
-        let names: Vec<_> = best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
-        remarks.push(format!(
-            "nothing is named: the nearest, {}, leaves {:.0} % of the misfit",
-            names.join(" with "),
-            100.0 * unexplained_fraction
-        ));
-        best = bare.clone();
+    let mut judged = judge(&search, best, &bare, nominal_resolution)?;
+    remarks.extend(judged.remark.take());
+    // A cause whose range holds the value at which it does nothing is not named.
+    let (mut doubts, mut dropped) = (Vec::new(), None);
+    while let Some((index, words)) = doubtful(&search, &judged)? {
+        let mut model = judged.best.model().clone();
+        dropped = Some(judged.best.model().clone());
+        model.terms.remove(index);
+        doubts.push(words);
+        judged = judge(&search, search.fitted(&model)?, &bare, nominal_resolution)?;
     }
-
-    // Is it the discretisation?
-    let coarse = search.fitted(&Model { resolution: nominal_resolution, ..best.model().clone() })?;
-    let refined = best.model().resolution != nominal_resolution && search.is_worth(&best, &coarse);
-    if best.model().resolution != nominal_resolution && !refined && above(&coarse) <= above(&best) + 0.01 {
-        best = coarse.clone();
-    }
-
-    let mut numerics = numerics(&search, &best)?;
-    // What is left may pull at the causes: by no more than its share of what they explain.
-    let free = best.model().terms.iter().flat_map(|term| {
-        let parameters = &plant.candidates()[term.candidate].parameters;
-        term.x.iter().zip(parameters).map(|(x, p)| x - p.off.unwrap_or(*x))
-    });
-    for (numerics, reach) in numerics.iter_mut().zip(free) {
-        *numerics = numerics.hypot(reach * unexplained_fraction.sqrt());
-    }
-    let intervals = intervals_of(&search, &best, &numerics)?;
+    remarks.extend(doubts.iter().cloned());
+    let Judged { best, coarse, refined, left, unexplained_fraction, is_unexplained, intervals, remark: _ } = judged;
+    let above = |scored: &Scored| scored.above(search.bench.count(&search.split.all()));
     progress("what could stand in the place of what was found");
     let tied = ties(&search, &best, &replaced, coarse_total);
     let mut effects = Vec::new();
@@ -122,6 +108,7 @@ pub fn diagnose(
         effects.push(adopted(&search, &best, index, term, &intervals, &tied)?);
     }
     let physics = best.model().terms.len();
+    let poor = poor.or_else(|| if physics == 0 { doubts.first().cloned() } else { None });
     let verdict = match () {
         () if is_unexplained => Verdict::Unexplained,
         () if physics == 0 && poor.is_some() && above(&best) > LEFT_OVER => Verdict::Unexplained,
@@ -129,13 +116,23 @@ pub fn diagnose(
         () if effects.iter().any(|effect| !effect.tied_with.is_empty()) => Verdict::Tied,
         () => Verdict::Named,
     };
-    if let Some(poor) = &poor {
+    if let Some(poor) = poor.as_ref().filter(|poor| !remarks.contains(poor)) {
         remarks.push(poor.clone());
     }
     let models: Vec<Model> =
         std::iter::once(best.model().clone()).chain(tied.iter().map(|(_, t)| t.scored.model().clone())).collect();
-    let next_experiment = if verdict == Verdict::Tied { separate(&models) } else { None };
-    let unexplained = if is_unexplained { super::tests::describe(plant, &search.split, &best.residuals) } else { Vec::new() };
+    let next_experiment = match (verdict, dropped, &poor) {
+        (Verdict::Tied, ..) => separate(&models),
+        // With what was dropped and without it.
+        (_, Some(dropped), _) => separate(&[best.model().clone(), dropped]),
+        (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
+        _ => None,
+    };
+    let unexplained = if is_unexplained {
+        super::tests::describe(plant, &search.split, &search.bench.used, &best.residuals)
+    } else {
+        Vec::new()
+    };
 
     let stage = |scored: &Scored, parameters: Vec<Estimate>| stage(plant, &search.split, &search.bench.used, scored, parameters);
     let constants = intervals_of(&search, &calibrated, &[])?;
@@ -179,6 +176,102 @@ pub fn diagnose(
         used: search.bench.used.clone(),
         split: search.split,
     })
+}
+
+/// A model with all causes beside what it has to explain.
+struct Judged {
+    best: Scored,
+    /// With the nominal number of joints.
+    coarse: Scored,
+    /// Whether the data ask for another number of joints than the nominal one.
+    refined: bool,
+    /// χ² per value above 1.
+    left: f64,
+    unexplained_fraction: f64,
+    is_unexplained: bool,
+    intervals: Intervals,
+    /// That nothing is named, if so.
+    remark: Option<String>,
+}
+
+/// Looks at what `best` leaves of what `bare`, without any cause, leaves, whether the discretisation matters, and how far the data leave the causes open.
+fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f64) -> Result<Judged, String> {
+    let plant = search.bench.plant;
+    let count = search.bench.count(&search.split.all());
+    let above = |scored: &Scored| scored.above(count);
+    let (left, whole) = (above(&best), above(bare));
+    let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
+    let handful = best.model().terms.len().max(2) as f64 - 1.0;
+    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / handful;
+    let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
+    let mut remark = None;
+    if unnamed && !best.model().terms.is_empty() {
+        let names: Vec<_> = best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
+        remark = Some(format!(
+            "nothing is named: the nearest, {}, leaves {:.0} % of the misfit",
+            names.join(" with "),
+            100.0 * unexplained_fraction
+        ));
+        best = bare.clone();
+    }
+
+    // Is it the discretisation?
+    let coarse = search.fitted(&Model { resolution: nominal_resolution, ..best.model().clone() })?;
+    let refined = best.model().resolution != nominal_resolution && search.is_worth(&best, &coarse);
+    if best.model().resolution != nominal_resolution && !refined && above(&coarse) <= above(&best) + 0.01 {
+        best = coarse.clone();
+    }
+
+    let mut numerics = numerics(search, &best)?;
+    // What is left may pull at the causes: by no more than its share of what they explain.
+    let free = best.model().terms.iter().flat_map(|term| {
+        let parameters = &plant.candidates()[term.candidate].parameters;
+        term.x.iter().zip(parameters).map(|(x, p)| x - p.off.unwrap_or(*x))
+    });
+    for (numerics, reach) in numerics.iter_mut().zip(free) {
+        *numerics = numerics.hypot(reach * unexplained_fraction.sqrt());
+    }
+    let intervals = intervals_of(search, &best, &numerics)?;
+    Ok(Judged { best, coarse, refined, left, unexplained_fraction, is_unexplained, intervals, remark })
+}
+
+/// A cause of the model that the data do not tell from none, the least certain if there are several, and how to say so: the 95 % ranges of all its
+/// parameters that can switch it off hold the value where they do. Of several such parameters, which may make up for one another, χ² without the cause decides as
+/// well.
+fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>, String> {
+    let Judged { best, intervals, .. } = judged;
+    let mut first = 0;
+    let mut found: Option<(f64, usize, String)> = None;
+    for (index, term) in best.model().terms.iter().enumerate() {
+        let own = first..first + term.x.len();
+        first = own.end;
+        let candidate = &search.bench.plant.candidates()[term.candidate];
+        let switches: Vec<(usize, f64)> =
+            own.clone().zip(&candidate.parameters).filter_map(|(k, free)| Some((k, free.off?))).collect();
+        let holds = |(k, off): &(usize, f64)| (intervals.ends[*k][0]..=intervals.ends[*k][1]).contains(off);
+        if switches.is_empty() || !switches.iter().all(holds) {
+            continue;
+        }
+        let mut without = best.model().clone();
+        without.terms.remove(index);
+        let inflation = own.map(|k| intervals.inflation[k]).fold(1.0, f64::max);
+        let gain = (search.fitted(&without)?.fitted - best.fitted) / inflation;
+        let needed = CHI2_95[(term.x.len() - 1).min(CHI2_95.len() - 1)];
+        if switches.len() > 1 && gain > needed {
+            continue;
+        }
+        let numbers: Vec<String> = estimates(search, index, term, intervals).iter().map(Estimate::words).collect();
+        let words = format!(
+            "the data are insufficient to name a cause: with {} ({}) they would be explained as well as without it, for the range reaches the value at \
+             which it does nothing",
+            candidate.id,
+            numbers.join(", ")
+        );
+        if found.as_ref().is_none_or(|(least, ..)| gain < *least) {
+            found = Some((gain, index, words));
+        }
+    }
+    Ok(found.map(|(_, index, words)| (index, words)))
 }
 
 /// What the search comes to.
@@ -246,6 +339,13 @@ fn poverty(plant: &dyn Plant, split: &Split) -> Option<String> {
         return Some(format!(
             "{} run is too little to tell causes apart: a cause has to be judged on a run that it was not fitted to",
             signals.len()
+        ));
+    }
+    let values = |runs: &[usize]| runs.iter().map(|run| signals[*run].values.len()).sum::<usize>();
+    let (fitted, held) = (values(&split.fit), values(&split.held));
+    if fitted < LEAST_FITTED || held < LEAST_HELD {
+        return Some(format!(
+            "{fitted} values to fit and {held} to judge by are too little to tell causes apart: {LEAST_FITTED} and {LEAST_HELD} are needed at least"
         ));
     }
     let still = |run: &usize| {
@@ -403,7 +503,7 @@ fn stage(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], scored: &Scored, 
         rmse_heldout_mm: held,
         rmse_heldout_ci95_mm: [(held - 1.96 * error).max(0.0), held + 1.96 * error],
         runs: runs.collect(),
-        residual_tests: residual_tests(plant, split, &scored.residuals),
+        residual_tests: residual_tests(plant, split, used, &scored.residuals),
         parameters,
     }
 }

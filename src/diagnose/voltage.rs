@@ -179,6 +179,82 @@ fn spline(t: &[f64], v: &[f64]) -> Vec<f64> {
     slopes
 }
 
+/// A row cannot be told from its neighbours if the cubic through two on either side misses it by this share of their swing: a sine of fewer than five rows
+/// a period. Rows near jumps and rows that move by less than a share of the run's swing do not count.
+const MISSED: f64 = 0.15;
+const MOVING: f64 = 0.1;
+/// Rows that are looked at together, and how many of them may not be told from their neighbours: corners of triangles and edges cost one to three each.
+const TOGETHER: usize = 20;
+const MOST_MISSED: usize = 8;
+/// A gap between rows is so many times the usual one; within it the voltage may not change by more than this share of the run's swing.
+const GAP: f64 = 3.0;
+const WITHIN_GAP: f64 = 0.5;
+
+/// Why voltages are not known between the rows, if so: they change too much from row to row, or across a gap.
+pub fn too_coarse(times: &[f64], volts: &[f64], actuators: usize) -> Option<String> {
+    let command = Command::new(times, volts, actuators);
+    let rows = times.len();
+    let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    let usual = *gaps.get(gaps.len() / 2)?;
+    let needed = "record the voltage at least ten times per period of the drive";
+    for actuator in 0..actuators {
+        let v: Vec<f64> = volts.iter().skip(actuator).step_by(actuators).copied().collect();
+        let swing = |part: &[f64]| {
+            let (low, high) = part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+            high - low
+        };
+        let range = swing(&v);
+        let is_missed = |i: usize| {
+            let stencil = i - 2..i + 3;
+            let moved = swing(&v[stencil.clone()]);
+            if moved < (MOVING * range).max(JUMP_LEAST) || command.jumps.iter().any(|row| (i - 2..i + 2).contains(row)) {
+                return false;
+            }
+            // Lagrange's cubic through the four neighbours, at their own times.
+            let neighbours = stencil.filter(|k| *k != i);
+            let cubic: f64 = neighbours
+                .clone()
+                .map(|k| {
+                    v[k] * neighbours
+                        .clone()
+                        .filter(|j| *j != k)
+                        .map(|j| (times[i] - times[j]) / (times[k] - times[j]))
+                        .product::<f64>()
+                })
+                .sum();
+            (v[i] - cubic).abs() > MISSED * moved
+        };
+        let missed: Vec<usize> = (2..rows.saturating_sub(2)).filter(|i| is_missed(*i)).collect();
+        if let Some(from) =
+            missed.windows(MOST_MISSED).find(|some| some[MOST_MISSED - 1] - some[0] < TOGETHER).map(|some| some[0])
+        {
+            return Some(format!(
+                "v{}_v changes too much from row to row to be known between them, from t_s = {} on, at {:.1} rows per second; {needed}, or it may be \
+                 taken for a slower one",
+                actuator + 1,
+                times[from],
+                1.0 / usual
+            ));
+        }
+        for row in 1..rows.saturating_sub(2) {
+            let slope = |k: usize| ((v[k + 1] - v[k]) / (times[k + 1] - times[k])).abs();
+            let gap = times[row + 1] - times[row];
+            if gap > GAP * usual && range > JUMP_LEAST && slope(row - 1).max(slope(row + 1)) * gap > WITHIN_GAP * range {
+                return Some(format!(
+                    "v{}_v moves while there is no row from t_s = {} to {}, against {:.1} rows per second elsewhere, and is not known there; {needed}, or split the \
+                     run at the gap",
+                    actuator + 1,
+                    times[row],
+                    times[row + 1],
+                    1.0 / usual
+                ));
+            }
+        }
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -208,6 +284,47 @@ mod tests {
             let allowed = if t < 0.01 { 3.0 } else { 0.5 };
             assert!((at(&table, t) - v(t)).abs() < allowed, "{t}: {} {}", at(&table, t), v(t));
         }
+    }
+
+    #[test]
+    fn a_voltage_that_is_not_known_between_its_rows_is_refused_and_others_are_not() {
+        let refused = |rate: f64, uneven: f64, v: &dyn Fn(f64) -> f64| {
+            let times: Vec<f64> = (0..240).map(|i| (f64::from(i) + uneven * (f64::from(i) * 7.3).sin()) / rate).collect();
+            let volts: Vec<f64> = times.iter().map(|t| v(*t)).collect();
+            too_coarse(&times, &volts, 1)
+        };
+        let sine = |f: f64| move |t: f64| -750.0 * (1.0 - (2.0 * PI * f * t).cos());
+        let square = |f: f64| move |t: f64| if (f * t).fract() < 0.5 { 0.0 } else { -900.0 };
+        let triangle = |f: f64| move |t: f64| 1500.0 * ((f * t).fract() - 0.5).abs();
+        for uneven in [0.0, 0.3] {
+            for (rate, f) in [(30.0, 18.0), (30.0, 12.0), (40.0, 18.0), (80.0, 18.0), (30.0, 14.9)] {
+                let found = refused(rate, uneven, &sine(f)).unwrap_or_else(|| panic!("{rate} {f} {uneven}"));
+                assert!(found.contains("rows per second"), "{found}");
+            }
+            for (rate, f) in [(500.0, 25.0), (180.0, 18.0), (120.0, 18.0), (500.0, 0.1), (200.0, 0.0)] {
+                assert_eq!(refused(rate, uneven, &sine(f)), None, "{rate} {f} {uneven}");
+            }
+            for f in [0.1, 1.0, 7.0] {
+                assert_eq!(
+                    (refused(200.0, uneven, &square(f)), refused(200.0, uneven, &triangle(f))),
+                    (None, None),
+                    "{f} {uneven}"
+                );
+            }
+        }
+        // A driver's log of a square wave, rounded by a lag of a row, and a log of a constant voltage with noise.
+        let lagged = |t: f64| -900.0 * (1.0 - (-(200.0 * t % 40.0)).exp()) * if (2.5 * t).fract() < 0.5 { 1.0 } else { 0.0 };
+        assert_eq!(refused(200.0, 0.0, &lagged), None);
+        assert_eq!(refused(200.0, 0.0, &|t| 1.5 * (1e5 * t * t).sin()), None);
+        // A gap while the voltage moves, and one while it rests.
+        let with_gap = |from: usize, to: usize, v: &dyn Fn(f64) -> f64| {
+            let times: Vec<f64> = (0..200).filter(|i| *i < from || *i > to).map(|i| f64::from(i as u32) / 200.0).collect();
+            let volts: Vec<f64> = times.iter().map(|t| v(*t)).collect();
+            too_coarse(&times, &volts, 1)
+        };
+        assert!(with_gap(50, 80, &sine(5.0)).unwrap().contains("no row from"));
+        assert_eq!(with_gap(50, 53, &sine(1.0)), None);
+        assert_eq!(with_gap(50, 80, &|t| if t < 0.1 { 0.0 } else { -900.0 }), None);
     }
 
     #[test]

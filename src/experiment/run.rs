@@ -115,7 +115,7 @@ pub fn run(
     }
     let mut recording = recorder.recording;
     recording.meta = experiment.meta(done, String::new());
-    see(&mut recording, &View::new(&experiment.effects));
+    see(&mut recording, &View::new(&experiment.effects), -0.5 * experiment.robot.segments()[0].length);
     let energy = books.as_ref().map(Books::balance);
     Ok(Run {
         recording,
@@ -126,11 +126,14 @@ pub fn run(
     })
 }
 
-/// Turns the recorded places of the nodes into what is seen of them; velocities stay those of the robot.
-fn see(recording: &mut Recording, view: &View) {
+/// Turns the recorded places of the nodes into what is seen of them, scaled and rolled about the left end of the flat robot at x = `origin` (cm);
+/// velocities stay those of the robot.
+fn see(recording: &mut Recording, view: &View, origin: f64) {
     if view.is_plain() {
         return;
     }
+    // What neither scales nor rolls keeps its bits.
+    let origin = if view.scale == 1.0 && view.tilt == 0.0 { 0.0 } else { origin };
     let width = 3 * recording.nodes();
     let late = |row: usize, column: usize| {
         let (p, v) = (&recording.positions, &recording.velocities);
@@ -147,9 +150,9 @@ fn see(recording: &mut Recording, view: &View) {
     let mut seen = recording.positions.clone();
     for row in 0..recording.len() {
         for node in 0..recording.nodes() {
-            let [x, z] = view.of([late(row, 3 * node), late(row, 3 * node + 2)]);
+            let [x, z] = view.of([late(row, 3 * node) - origin, late(row, 3 * node + 2)]);
             let at = row * width + 3 * node;
-            (seen[at], seen[at + 2]) = (x, z);
+            (seen[at], seen[at + 2]) = (x + origin, z);
         }
     }
     recording.positions = seen;

@@ -12,6 +12,8 @@ use crate::model::units::mm_from_cm;
 const TOUCHING: f64 = 0.005;
 /// Largest [`repetition`] that still counts as the same motion. Measured at 14 Hz: 0.01 to 0.1 after two periods, 0.6 after one.
 const SAME: f64 = 0.2;
+/// Voltages within this share of their travel from the last one stand still: a jump with 5 % of creep does.
+const STILL: f64 = 0.1;
 
 /// Measures of one run; those that make no sense for its mount or drive are absent.
 ///
@@ -30,8 +32,8 @@ pub struct Measures {
     /// the run (deg): 0 for slow drives, negative for a lag. Clamped robots with a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_phase_deg: Option<f64>,
-    /// Frequency of the largest response (Hz), from how the right end rings: see [`Mode::of_ringing`]. Clamped robots whose voltage does
-    /// not repeat.
+    /// Frequency of the largest response (Hz), from how the right end rings after the last change of voltage: see [`Mode::of_ringing`]. Clamped
+    /// robots whose voltage does not repeat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resonance_hz: Option<f64>,
     /// Damping ratio of that mode (–).
@@ -128,7 +130,8 @@ impl Measures {
         if let Some(period) = period {
             let volts: Vec<f64> = recording.motor_voltages.iter().step_by(recording.joints()).copied().collect();
             measures.tip_phase_deg = phase_between(recording, &tip, &volts, period);
-        } else if let Some(mode) = Mode::of_ringing(&recording.time, &tip) {
+        } else if let Some(mode) = still_from(recording).and_then(|from| Mode::of_ringing(&recording.time[from..], &tip[from..]))
+        {
             measures.resonance_hz = Some(mode.resonance_hz);
             measures.damping_ratio = Some(mode.damping_ratio);
             measures.half_power_bandwidth_hz = Some(mode.half_power_bandwidth_hz);
@@ -205,6 +208,17 @@ impl Measures {
         };
         full.named().into_iter().map(|(name, _)| name).collect()
     }
+}
+
+/// The record from which on all voltages keep to their last value, but for creep and the like: what moves then rings, what moves before is driven.
+fn still_from(recording: &Recording) -> Option<usize> {
+    let joints = recording.joints();
+    let rows: Vec<&[f64]> = recording.motor_voltages.chunks_exact(joints.max(1)).collect();
+    let last = rows.last()?;
+    let away = |row: &[f64]| row.iter().zip(*last).fold(0.0_f64, |most, (v, end)| most.max((v - end).abs()));
+    let range = rows.iter().fold(0.0_f64, |most, row| most.max(away(row)));
+    let size = rows.iter().flat_map(|row| row.iter()).fold(0.0_f64, |most, v| most.max(v.abs()));
+    Some(if range <= STILL * size { 0 } else { rows.iter().rposition(|row| away(row) > STILL * range).map_or(0, |row| row + 1) })
 }
 
 fn z_mm(recording: &Recording, record: usize, node: usize) -> f64 {
@@ -304,11 +318,35 @@ mod tests {
     #[test]
     fn a_tip_that_rings_has_a_resonance() {
         let tip = |i: usize, t: f64| (0.0, if i == 2 { -1.0 + (-4.0 * t).exp() * (2.0 * PI * 10.0 * t).cos() } else { 0.0 });
-        let measures = Measures::of(&recording(&times(), 1, 1.0, tip), Mount::Clamped, None);
+        let mut left_alone = recording(&times(), 1, 1.0, tip);
+        left_alone.motor_voltages.fill(-1.0);
+        let measures = Measures::of(&left_alone, Mount::Clamped, None);
         let zeta = 4.0 / (4.0_f64.powi(2) + (2.0 * PI * 10.0).powi(2)).sqrt();
         assert!((measures.damping_ratio.unwrap() / zeta - 1.0).abs() < 2e-3);
         assert!((measures.resonance_hz.unwrap() - 10.0).abs() < 0.06);
         assert_eq!(measures.tip_phase_deg, None);
+    }
+
+    #[test]
+    fn a_driven_tip_does_not_ring_and_one_that_is_left_alone_does() {
+        // As driven by a file, which has no period.
+        let tip =
+            |i: usize, t: f64| (0.0, if i == 2 { (1.0 + 0.2 * (-2.0 * t).exp()) * (2.0 * PI * 10.0 * t).cos() } else { 0.0 });
+        let mut driven = recording(&times(), 1, 10.0, tip);
+        let measures = Measures::of(&driven, Mount::Clamped, None);
+        assert_eq!((measures.damping_ratio, measures.resonance_hz, measures.half_power_bandwidth_hz), (None, None, None));
+        assert!(measures.tip_amplitude_mm.is_some());
+        // The voltage stops at half a second, then the tip rings.
+        let ring = |i: usize, t: f64| {
+            let after = (t - 0.5).max(0.0);
+            (0.0, if i == 2 { (-4.0 * after).exp() * (2.0 * PI * 10.0 * t).cos() } else { 0.0 })
+        };
+        driven = recording(&times(), 1, 10.0, ring);
+        for (record, t) in times().iter().enumerate().filter(|(_, t)| **t > 0.5) {
+            driven.motor_voltages[record] = if *t > 0.0 { -2.0 } else { 0.0 };
+        }
+        let zeta = 4.0 / (4.0_f64.powi(2) + (2.0 * PI * 10.0).powi(2)).sqrt();
+        assert!((Measures::of(&driven, Mount::Clamped, None).damping_ratio.unwrap() / zeta - 1.0).abs() < 5e-3);
     }
 
     #[test]

@@ -68,7 +68,8 @@ impl Mode {
     ///
     /// δ: logarithmic decrement of half a period, Δt: mean time between turning points, both from a straight line through all swings above
     /// 1 % of the first. Differences of neighbouring turning points do not depend on where the signal comes to rest. The width of the
-    /// peak is 2 ζ f_n, right for light damping. `None` if there are fewer than three swings or the mode is too damped to peak.
+    /// peak is 2 ζ f_n, right for light damping. `None` if there are fewer than three swings, if the mode is too damped to peak, or if the swings
+    /// do not die out: their logarithms fall by less than 1 % in all, or by less than two standard errors of the line's slope.
     ///
     /// # References
     /// D. J. Inman, *Engineering Vibration*, sections 1.6 (logarithmic decrement) and 2.2 (resonance peak).
@@ -83,6 +84,9 @@ impl Mode {
         let logs: Vec<f64> = swings[..count].iter().map(|swing| swing.ln()).collect();
         let when: Vec<f64> = turns[..=count].iter().map(|turn| turn.0).collect();
         let decrement = -slope(&logs);
+        if decrement * (count - 1) as f64 <= LEAST_DECAY || decrement <= 2.0 * slope_error(&logs, -decrement) {
+            return None;
+        }
         let damping_ratio = decrement / std::f64::consts::PI.hypot(decrement);
         let natural = 1.0 / (2.0 * slope(&when)) / (1.0 - damping_ratio.powi(2)).sqrt();
         let peak = 1.0 - 2.0 * damping_ratio.powi(2);
@@ -114,6 +118,8 @@ impl Mode {
     }
 }
 
+/// Decay of all swings together below which they are taken for constant: what interpolation between samples leaves open.
+const LEAST_DECAY: f64 = 0.01;
 /// Share of the last swing by which a signal must turn back for a turning point to count: passes over ripples of higher modes.
 const HYSTERESIS: f64 = 0.05;
 
@@ -161,6 +167,17 @@ fn slope(values: &[f64]) -> f64 {
         (up + x * y, down + x * x)
     });
     up / down
+}
+
+/// Standard error of that slope, from how far the values lie off the line.
+fn slope_error(values: &[f64], slope: f64) -> f64 {
+    let n = values.len() as f64;
+    let (middle, mean) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
+    let (off, down) = values.iter().enumerate().fold((0.0, 0.0), |(off, down), (i, y)| {
+        let x = i as f64 - middle;
+        (off + (y - mean - slope * x).powi(2), down + x * x)
+    });
+    (off / (n - 2.0).max(1.0) / down).sqrt()
 }
 
 /// Root mean square of how far the signals of a system differ from what they were `period` (s) before, as a share of what unrelated
@@ -234,6 +251,20 @@ mod tests {
         let (times, values) = sampled(1.0, 1e-3, |t| (-t).exp());
         assert_eq!(Mode::of_ringing(&times, &values), None);
         assert_eq!(Mode::of_ringing(&[], &[]), None);
+    }
+
+    #[test]
+    fn oscillations_that_grow_or_stay_have_no_damping_ratio() {
+        let noise = |t: f64| 0.01 * (1e4 * t * t).sin();
+        for (rate, rough) in [(0.0, 0.0), (0.0, 1.0), (0.3, 0.0), (3.0, 1.0), (-1e-4, 1.0), (-1e-4, 0.0)] {
+            for step in [1e-3, 3.1e-3, 7e-3] {
+                let (times, values) = sampled(2.0, step, |t| (rate * t).exp() * (2.0 * PI * 18.0 * t).cos() + rough * noise(t));
+                assert_eq!(Mode::of_ringing(&times, &values), None, "{rate} {rough} {step}");
+            }
+        }
+        let (times, values) = sampled(2.0, 1e-3, |t| (-0.5 * t).exp() * (2.0 * PI * 18.0 * t).cos() + noise(t));
+        let zeta = 0.5 / (2.0 * PI * 18.0);
+        assert!((Mode::of_ringing(&times, &values).unwrap().damping_ratio / zeta - 1.0).abs() < 0.1);
     }
 
     #[test]
