@@ -132,7 +132,7 @@ fn a_name_that_is_nearly_right_is_suggested_with_its_place() {
     }
     let dataset = "[dataset]\nname = \"d\"\n[robot]\nactuators = 1\nmount = \"clamped\"\n[[observation]]\nmeasure = \"resonance\"\n\
         value = 20\nsigma = 1\n[observation.drive]\nwaveform = \"dc\"\nvoltages_v = [1]\n";
-    let said = refused(&[("d.toml", dataset)], &["diagnose", "d.toml", "--out", "d"], 3);
+    let said = refused(&[("d.toml", dataset)], &["diagnose", "d.toml", "--out", "d"], 2);
     assert!(said.contains("line 7") && said.contains("did you mean resonance_hz?"), "{said}");
     let said = refused(&[("d.toml", &dataset.replace("sigma", "sigm"))], &["diagnose", "d.toml", "--out", "d"], 2);
     assert!(said.contains("line 9, column 1") && said.contains("did you mean sigma?"), "{said}");

@@ -1,7 +1,7 @@
 //! The loop over steps.
 
 use super::Experiment;
-use crate::drive::Means;
+use crate::drive::{Means, Waveform};
 use crate::effects::View;
 use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
@@ -77,7 +77,8 @@ pub fn run(
     let mut books = experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step));
     let mut voltages = vec![0.0; experiment.robot.actuators];
     let midpoint = engine.midpoint();
-    let parts = engine.parts();
+    // A smooth drive needs no parts.
+    let parts = if matches!(experiment.drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
     let mut pieces = vec![0.0; parts * experiment.robot.actuators];
     let mut interrupted = false;
     let mut done = engine.step();

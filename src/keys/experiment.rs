@@ -205,7 +205,7 @@ pub(super) const SIMULATION: Section = Section {
         key("engine", Word(&["bullet", "planar"]), Is("\"bullet\""), "bullet: bit for bit the reference; planar: the fast one. In sweeps the default is planar"),
         key("start", Word(&["flat", "settled"]), Is("\"flat\""), "flat and at rest; or in equilibrium with gravity, floor and first voltages (planar engine)"),
         key("friction", Word(&["convex", "coulomb"]), Is("\"convex\""), "model of sliding: convex lifts sliding contacts by friction times speed times time step; coulomb does not and is slower").with("engine = \"planar\""),
-        key("numerical_damping_per_s", Number(NotNegative), Is("50.0"), "weight of a step's end over that of its start, per time step: damps what alternates from step to step; less is more exact where nothing touches").with("engine = \"planar\""),
+        key("numerical_damping_per_s", Number(NotNegative), Else("50"), "weight of a step's end over that of its start, per time step: damps what alternates from step to step; less is more exact where nothing touches").with("engine = \"planar\""),
         key("time_step_s", Other("a positive number, or \"auto\" on the planar engine"), Needed, "time step; \"auto\" takes the coarsest that halving changes by less than step_error"),
         key("step_error", Number(Inside(0.0, 1.0)), Is("0.001"), "relative change of the result that halving the step may make").with("time_step_s = \"auto\""),
         key("step_measure", Name("measure", definitions::names), Else("the path of all nodes"), "name of the measure that decides the step").with("time_step_s = \"auto\""),
@@ -213,7 +213,7 @@ pub(super) const SIMULATION: Section = Section {
         key("duration_s", Number(Positive), Else("steps is needed"), "length of the run"),
         key("record_every_steps", Whole(Positive), Else("about a thousand records"), "steps from one record to the next; the first and last step are always recorded"),
         key("record_every_s", Number(Positive), Else("from record_every_steps"), "time from one record to the next"),
-        key("record_from_step", Whole(NotNegative), Else("one less than the steps between records"), "step before which the first regular record is taken: 0 records at whole multiples of the interval"),
+        key("record_from_step", Other("a whole number from 0 on"), Else("one less than the steps between records"), "step before which the first regular record is taken: 0 records at whole multiples of the interval"),
     ],
 };
 

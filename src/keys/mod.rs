@@ -107,8 +107,9 @@ pub enum Default {
 pub static FILES: [&File; 3] = [&experiment::FILE, &sweep::FILE, &dataset::FILE];
 
 /// Units by the ends of names, longest first.
-const UNITS: [(&str, &str); 13] = [
+const UNITS: [(&str, &str); 14] = [
     ("_mm_per_s", "mm/s"),
+    ("_per_s", "1/s"),
     ("_pm_per_v", "pm/V"),
     ("_kv_mm", "kV/mm"),
     ("_g_cm3", "g/cm³"),
