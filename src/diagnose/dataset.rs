@@ -319,7 +319,7 @@ fn line_of(text: &str, way: &[Part]) -> u64 {
             (Part::Key(key), None) => first.iter().find(|(name, _)| name.get_ref().as_ref() == *key),
             (Part::Key(key), Some(DeValue::Table(table))) => table.iter().find(|(name, _)| name.get_ref().as_ref() == *key),
             (Part::Index(index), Some(DeValue::Array(array))) => {
-                let Some(item) = array.iter().nth(*index) else { break };
+                let Some(item) = array.get(*index) else { break };
                 (offset, at) = (item.span().start, Some(item.get_ref()));
                 continue;
             }
