@@ -388,6 +388,9 @@ fn a_run_goes_on_from_a_saved_state_with_the_same_bits_and_not_from_another_robo
     let cut = fs::read_to_string(bench.path("s.json")).unwrap().replace("\"state\":[", "\"state\":[1.0,");
     fs::write(bench.path("cut.json"), cut).unwrap();
     bench.refuses(&["run", "a.toml", "--load-state", "cut.json"], 3, &["cut.json"]);
+    let huge = fs::read_to_string(bench.path("cut.json")).unwrap().replace("[1.0,", "[1e200,");
+    fs::write(bench.path("huge.json"), huge).unwrap();
+    bench.refuses(&["run", "a.toml", "--load-state", "huge.json"], 3, &["huge.json", "number 1 of the state is 1e200"]);
 }
 
 #[test]
