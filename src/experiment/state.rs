@@ -7,6 +7,9 @@ use super::Experiment;
 use crate::engine::{Engine, EngineError};
 use crate::words;
 
+/// Largest size of a number of a state (CGS): its square times any constant of a robot is a number.
+const LARGEST: f64 = 1e100;
+
 /// A state between two steps, as a JSON object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,6 +51,9 @@ impl SavedState {
             serde_json::from_str(text).map_err(|error| format!("not a saved state: {}", words::json_error(&error)))?;
         if saved.schema != 1 {
             return Err(format!("a state of schema {}, but this program reads schema 1", saved.schema));
+        }
+        if let Some(at) = saved.state.iter().position(|value| value.abs() > LARGEST) {
+            return Err(format!("number {} of the state is {:e}: no robot comes into such a state", at + 1, saved.state[at]));
         }
         let Value::Object(needed) = robot(experiment) else { return Err("no robot".into()) };
         match needed.iter().find(|(key, value)| saved.robot.get(key) != Some(value)) {

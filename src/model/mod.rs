@@ -42,9 +42,15 @@ pub enum ModelError {
     },
 }
 
+/// Largest size of a constant in CGS units, and the reciprocal of the least: what is computed of such constants neither overflows nor vanishes.
+const LARGEST: f64 = 1e20;
+
 impl ModelError {
     /// `value` is in CGS units.
     fn unless(holds: bool, key: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
-        if holds { Ok(()) } else { Err(Self::Value { key, value: units::in_unit_of(key, value), needed }) }
+        // Infinity stands for "no limit" where it is allowed.
+        let computable = value == 0.0 || value.is_infinite() || (1.0 / LARGEST..=LARGEST).contains(&value.abs());
+        let needed = if holds && !computable { "of a size between 1e-20 and 1e20 in CGS units" } else { needed };
+        if holds && computable { Ok(()) } else { Err(Self::Value { key, value: units::in_unit_of(key, value), needed }) }
     }
 }

@@ -310,6 +310,20 @@ mod tests {
     }
 
     #[test]
+    fn constants_of_a_size_that_cannot_be_computed_with_are_refused_by_their_key() {
+        for size in [1e-300, 1e-21, 1e21, 1e185, 1e308] {
+            let mut robot = robot(2, 1, Film::None);
+            robot.material.width = size;
+            let error = robot.check().unwrap_err().to_string();
+            assert!(error.contains("material.width_mm") && error.contains("between 1e-20 and 1e20"), "{error}");
+        }
+        let mut still = robot(2, 1, Film::None);
+        still.material.gravity = 0.0;
+        still.friction.low = 0.0;
+        assert_eq!(still.check(), Ok(()));
+    }
+
+    #[test]
     fn damping_keys_convert_into_each_other() {
         let eta = Damping::Eta(0.045);
         assert_eq!(eta.time(), 0.045 / (2.0 * std::f64::consts::PI));

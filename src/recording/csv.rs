@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError};
+use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError, check_values};
 use crate::files;
 use crate::model::units::{cm_from_mm, mm_from_cm};
 
@@ -108,10 +108,12 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
             .iter()
             .zip(&wanted)
             .map(|(text, name)| {
-                let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-                value.ok_or_else(|| format!("line {line}: {name}: {text:?} is not a number"))
+                let value = text.parse::<f64>().map_err(|_| format!("line {line}: {name}: {text:?} is not a number"))?;
+                check_values(&[value])
+                    .map_err(|_| format!("line {line}: {name}: {text:?} is no number that a robot comes to"))?;
+                Ok(value)
             })
-            .collect::<Result<Vec<_>, _>>()?;
+            .collect::<Result<Vec<_>, String>>()?;
         if recording.time.last().is_some_and(|last| numbers[0] <= *last) {
             return Err(format!("line {line}: t_s is {}, but times must rise", numbers[0]));
         }

@@ -36,6 +36,14 @@ pub enum RecordingError {
 /// The most numbers that a recording holds (3.2 GB).
 pub(crate) const MAX_VALUES: f64 = 4e8;
 
+/// Checks numbers that were read, in CGS units: up to a size of 1e100 their squares and all that is drawn of them are numbers too.
+fn check_values(values: &[f64]) -> Result<(), String> {
+    match values.iter().position(|value| value.is_nan() || value.abs() > 1e100) {
+        Some(at) => Err(format!("number {} of it is {}, which no robot comes to", at + 1, values[at])),
+        None => Ok(()),
+    }
+}
+
 /// Numbers that go with a trajectory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Meta {

@@ -16,7 +16,7 @@ use zip::ZipArchive;
 use zip::result::ZipError;
 
 use super::npy::{self, Array};
-use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError};
+use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError, check_values};
 use crate::words::number;
 
 /// Length of `MM_DD_YYYY_HH_MM`.
@@ -137,6 +137,7 @@ impl<R: Read + Seek> Arrays<R> {
         if array.shape != shape {
             return Err(format!("key {key}: the shape is {:?}, but the other keys make it {shape:?}", array.shape));
         }
+        check_values(&array.values).map_err(|reason| format!("key {key}: {reason}"))?;
         Ok(array.values)
     }
 
@@ -177,6 +178,10 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
     let joints = usize::try_from(actuators * motors_per_actuator).map_err(|error| error.to_string())?;
     let Array { shape, values: time } = arrays.array("dataTime")?;
     let [t] = shape[..] else { return Err(format!("key dataTime: the shape is {shape:?}, but one axis is needed")) };
+    check_values(&time).map_err(|reason| format!("key dataTime: {reason}"))?;
+    if let Some(at) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        return Err(format!("key dataTime: {} follows {}, but times must rise", time[at + 1], time[at]));
+    }
     let values = t as f64 * (10.0 * joints as f64 + 13.0);
     if values > MAX_VALUES {
         return Err(format!("{t} records of {joints} joints are {values:.1e} numbers, more than {MAX_VALUES:.0e}"));
@@ -325,6 +330,20 @@ mod tests {
             let error = read(&with_time(&npy_of(shape, &vec![0; data])), Path::new("claim.npz")).unwrap_err().to_string();
             assert!(error.contains("claim.npz") && error.contains("dataTime") && error.contains(words), "{shape}: {error}");
         }
+    }
+
+    #[test]
+    fn numbers_that_no_robot_comes_to_and_times_that_do_not_rise_are_refused_by_their_key() {
+        for (bad, words) in [(f64::NAN, "number 2 of it is NaN"), (f64::INFINITY, "inf"), (-1e200, "-1")] {
+            let mut recording = sample(3);
+            recording.rates[1] = bad;
+            let error = read(&bytes(&recording), Path::new("bad.npz")).unwrap_err().to_string();
+            assert!(error.contains("dataAngularVelocities") && error.contains(words), "{error}");
+        }
+        let mut recording = sample(3);
+        recording.time[2] = recording.time[1];
+        let error = read(&bytes(&recording), Path::new("bad.npz")).unwrap_err().to_string();
+        assert!(error.contains("dataTime") && error.contains("must rise"), "{error}");
     }
 
     #[test]
