@@ -139,7 +139,7 @@ fn shards_are_merged_when_all_are_there_and_not_before() {
 fn bad_sweeps_are_refused_before_anything_runs() {
     let bench = Bench::new();
     for (name, vary, words) in [
-        ("unknown.toml", "\"robot.legs\" = [4]", ["legs", "unknown field"]),
+        ("unknown.toml", "\"robot.legs\" = [4]", ["legs", "there is no key"]),
         ("empty.toml", "\"robot.damping_eta\" = []", ["robot.damping_eta", "no values"]),
         ("range.toml", "\"robot.damping_eta\" = { from = 0, to = 1, count = 0 }", ["robot.damping_eta", "no values"]),
         ("point.toml", "\"robot.damping_eta\" = [0.01, -0.01]", ["robot.damping_eta", "zero or more"]),
@@ -278,6 +278,30 @@ fn a_drive_that_was_edited_is_another_sweep() {
     bench.done(&["s.toml", "--out", "other"]);
     assert_ne!(bench.read("other/results.csv"), before);
     assert_eq!(bench.read("out/results.csv"), before);
+}
+
+#[test]
+fn a_drive_that_is_edited_while_the_sweep_runs_stops_it() {
+    let bench = Bench::new();
+    let drive = "waveform = \"csv\"\nfile = \"drive.csv\"";
+    fs::write(bench.path("a.toml"), EXPERIMENT.replace("waveform = \"dc\"\nvoltages_v = [0]", drive)).unwrap();
+    let text = "experiment = \"a.toml\"\nmeasures = [\"tip_deflection_mm\"]\n[vary]\n\
+        \"robot.damping_eta\" = { from = 0.01, to = 0.02, count = 400 }\n";
+    fs::write(bench.path("s.toml"), text).unwrap();
+    fs::write(bench.path("drive.csv"), "t_s,v1_v\n0,-500\n").unwrap();
+    let child = bench.command(&["s.toml", "--out", "out", "--jobs", "1"]).stderr(Stdio::piped()).spawn().unwrap();
+    let path = bench.path("out/rows-1-of-1.csv");
+    let start = Instant::now();
+    while rows(&path).lines().count() < 2 {
+        assert!(start.elapsed() < Duration::from_secs(60), "the sweep makes no rows");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    fs::write(bench.path("drive.csv"), "t_s,v1_v\n0,-600\n").unwrap();
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("drive.csv: changed while the sweep runs"), "{text}");
+    assert!(!rows(&path).contains("failed") && !bench.path("out/results.csv").exists());
 }
 
 #[test]

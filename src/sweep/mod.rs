@@ -21,8 +21,7 @@ pub use rows::{Row, RowError, Rows, merge};
 pub use run::{Outcome, run};
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::{Table, Value};
@@ -159,16 +158,32 @@ impl Sweep {
         }
         let mut sweep = Self { source, measures: file.measures, axes, files: BTreeMap::new() };
         for index in 0..sweep.len() {
-            let source = sweep.source_of(index)?;
-            for file in experiment::check(&source)?.config.files() {
-                if let Entry::Vacant(entry) = sweep.files.entry(file.display().to_string()) {
-                    let path = source.folder.join(file);
-                    let bytes = files::read(&path).map_err(|error| ConfigError::Data { path, reason: error.to_string() })?;
-                    entry.insert(files::digest(&bytes));
+            for file in experiment::check(&sweep.source_of(index)?)?.config.files() {
+                let name = file.display().to_string();
+                if !sweep.files.contains_key(&name) {
+                    sweep.files.insert(name, sweep.digest(file)?);
                 }
             }
         }
         Ok(sweep)
+    }
+
+    fn digest(&self, file: &Path) -> Result<String, ConfigError> {
+        let path = self.source.folder.join(file);
+        match files::read(&path) {
+            Ok(bytes) => Ok(files::digest(&bytes)),
+            Err(error) => Err(ConfigError::Data { path, reason: error.to_string() }),
+        }
+    }
+
+    /// The first of an experiment's files that is not what it was when the sweep was read; without an experiment, of all files.
+    fn changed(&self, experiment: Option<&Experiment>) -> Option<PathBuf> {
+        let as_before = |file: &Path| self.files.get(&file.display().to_string()) == self.digest(file).ok().as_ref();
+        let changed = match experiment {
+            Some(experiment) => experiment.config.files().find(|file| !as_before(file)),
+            None => self.files.keys().map(Path::new).find(|file| !as_before(file)),
+        };
+        changed.map(|file| self.source.folder.join(file))
     }
 
     /// Reads a sweep file, or a built-in one (`preset:NAME`, or `NAME` where there is no file of that name), with settings `KEY=VALUE`

@@ -1,6 +1,6 @@
 //! Computing the points that are not there yet.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -55,9 +55,16 @@ pub fn run(
             if given_up() {
                 return Ok(());
             }
-            let Some(row) = compute(sweep, index, &given_up) else { return Ok(()) };
+            let row = compute(sweep, index, &given_up);
             let mut rows = rows.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            let result = rows.append(row);
+            let result = match row {
+                Ok(None) => return Ok(()),
+                Ok(Some(row)) => rows.append(row),
+                Err(path) => Err(RowError::Foreign {
+                    path,
+                    reason: "changed while the sweep runs; put it back, or start again with another --out".into(),
+                }),
+            };
             broken.fetch_or(result.is_err(), Ordering::Relaxed);
             progress(rows.done().len(), mine.len());
             result
@@ -73,9 +80,13 @@ pub fn run(
     })
 }
 
-/// Runs one point; `None` if it was given up.
-fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Option<Row> {
-    let run = sweep.experiment(index).map_err(|error| error.to_string()).and_then(|experiment| {
+/// Runs one point; `None` if it was given up. The error is a file that was changed since the sweep was read.
+fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Result<Option<Row>, PathBuf> {
+    let experiment = sweep.experiment(index);
+    if let Some(path) = sweep.changed(experiment.as_ref().ok()) {
+        return Err(path);
+    }
+    let run = experiment.map_err(|error| error.to_string()).and_then(|experiment| {
         let mut engine = experiment.engine().map_err(|error| error.to_string())?;
         let observe = |_| if given_up() { Control::Stop } else { Control::Continue };
         let run = experiment::run(&experiment, engine.as_mut(), observe).map_err(|error| error.to_string())?;
@@ -83,18 +94,18 @@ fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Option<
     });
     let none = vec![None; sweep.measures.len()];
     let (experiment, run) = match run {
-        Ok((_, Run { interrupted: true, .. })) => return None,
+        Ok((_, Run { interrupted: true, .. })) => return Ok(None),
         Ok(pair) => pair,
-        Err(reason) => return Some(Row { index, measures: none, status: format!("failed: {reason}") }),
+        Err(reason) => return Ok(Some(Row { index, measures: none, status: format!("failed: {reason}") })),
     };
     let trouble = run.trouble(&experiment);
     if let Some(reason) = trouble.first() {
-        return Some(Row { index, measures: none, status: format!("failed: {reason}") });
+        return Ok(Some(Row { index, measures: none, status: format!("failed: {reason}") }));
     }
     let measures = Measures {
         energy_error: run.audited.then(|| run.energy.error()),
         ..Measures::of(&run.recording, experiment.robot.mount, experiment.drive.period())
     };
     let measures = sweep.measures.iter().map(|name| measures.get(name)).collect();
-    Some(Row { index, measures, status: "ok".into() })
+    Ok(Some(Row { index, measures, status: "ok".into() }))
 }
