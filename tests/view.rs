@@ -134,7 +134,7 @@ fn what_cannot_be_drawn_leaves_no_file() {
     bench.refuses(&["plot", "bad.npz", "--out", "b.svg"], 3, "bad.npz");
     bench.refuses(&["plot", "bad.csv", "--out", "b.svg"], 3, "status");
     bench.refuses(&["plot", "none.npz", "--out", "b.svg"], 3, "none.npz");
-    bench.refuses(&["plot", "a.npz", "--out", "b.png"], 2, ".svg");
+    bench.refuses(&["plot", "a.npz", "--out", "b.jpg"], 2, ".png");
     bench.refuses(&["plot", "a.npz", "--out", "none/b.svg"], 2, "none");
     bench.refuses(&["animate", "bad.npz", "--out", "b.gif"], 3, "bad.npz");
     bench.refuses(&["animate", "a.npz", "--out", "b.mp4"], 2, ".html");
@@ -241,7 +241,7 @@ fn the_page_plays_and_scrubs_in_a_browser_without_an_error() {
     // Record 60 is the state before step 5999, at 120 ms: in the second half of the second period, the middle three are on.
     assert_eq!(browser.value("document.getElementById('time').textContent"), "120.0 ms");
     let volts = browser.value("[...document.querySelectorAll('#volts span')].map((chip) => chip.textContent)");
-    assert_eq!(volts, json!(["0 V", "520 V", "-1500 V", "520 V", "0 V"]));
+    assert_eq!(volts, json!(["0 V", "520 V", "−1500 V", "520 V", "0 V"]));
     // The robot is drawn: a few thousand pixels of the canvas are neither white nor transparent.
     let inked = "(() => { const c = document.getElementById('view'); \
         const p = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \

@@ -6,16 +6,16 @@ use std::process::ExitCode;
 use super::output::{finish, pending};
 use super::{Failure, Options, print};
 use crate::recording::{Recording, csv, npz};
-use crate::view::{self, Kind, ResultsError};
+use crate::view::{self, Figure, Kind, ResultsError, Size, View};
 
-/// Draw a recording or the results of a sweep as SVG.
+/// Draw a recording or the results of a sweep as SVG, PDF or PNG, in the size of a journal's column.
 ///
-/// Example: sfers plot jump.npz --kind traces --out jump.svg
+/// Example: sfers plot jump.npz --kind traces --out jump.pdf
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A recording, FILE.npz (this program's or the reference's) or FILE.csv (this program's), or a sweep's results.csv.
     input: PathBuf,
-    /// The figure, FILE.svg; `-` is standard output.
+    /// The figure, FILE.svg, FILE.pdf or FILE.png; `-` is SVG on standard output.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// What of a recording is drawn.
@@ -24,6 +24,41 @@ pub struct Args {
     /// Which measure of results is drawn; by default the first, with those of the same unit.
     #[arg(long, value_name = "NAME")]
     measure: Option<String>,
+    /// Draw only rows of results with this value of a varied key, such as --where friction.low=1.
+    #[arg(long = "where", value_name = "KEY=VALUE", value_parser = pair)]
+    only: Vec<(String, String)>,
+    /// Draw a panel for each value of this varied key; by default results over three and more keys choose those with the fewest values.
+    #[arg(long, value_name = "KEY")]
+    by: Vec<String>,
+    /// Size on paper: one column of a journal (85 mm, letters of 8 pt), two (175 mm, 8 pt), or a page on a screen (170 mm, 9.5 pt).
+    #[arg(long, value_enum, default_value = "single")]
+    size: Format,
+    /// Another width (mm).
+    #[arg(long, value_name = "X", value_parser = within(40.0, 1000.0))]
+    width_mm: Option<f64>,
+    /// Resolution of a PNG (dots per inch).
+    #[arg(long, value_name = "N", value_parser = within(30.0, 1200.0), default_value = "300")]
+    dpi: f64,
+}
+
+/// Names of sizes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    Single,
+    Double,
+    Screen,
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("must be KEY=VALUE")?;
+    Ok((key.trim().into(), value.trim().into()))
+}
+
+fn within(low: f64, high: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|value| (low..=high).contains(value));
+        number.ok_or_else(|| format!("must be a number from {low} to {high}"))
+    }
 }
 
 /// What a file's name ends in.
@@ -46,28 +81,60 @@ pub fn recording(path: &Path, options: Options) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
-pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
-    let to_stdout = args.out == Path::new("-");
-    if !to_stdout && extension(&args.out) != "svg" {
-        return Err(Failure::Usage(format!("{}: the name must end in .svg", args.out.display())));
-    }
-    let file = if to_stdout { None } else { Some(pending(&args.out)?) };
-    let svg = match extension(&args.input) {
-        "npz" => args.kind.figure(&recording(&args.input, options)?).svg(),
-        "csv" if csv::is_recording(&args.input) => args.kind.figure(&recording(&args.input, options)?).svg(),
+/// The name of a file without its ending; for a sweep's results that of their folder.
+pub fn name(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "results");
+    folder.unwrap_or(stem).to_string_lossy().into_owned()
+}
+
+fn figure(args: &Args, options: Options) -> Result<Figure, Failure> {
+    let of_results = args.measure.is_some() || !args.only.is_empty() || !args.by.is_empty();
+    match extension(&args.input) {
+        "npz" | "csv" if extension(&args.input) == "npz" || csv::is_recording(&args.input) => {
+            if of_results {
+                let reason = "--measure, --where and --by choose from results of a sweep, and this is a recording";
+                return Err(Failure::Usage(format!("{}: {reason}", args.input.display())));
+            }
+            Ok(args.kind.titled(&name(&args.input), &recording(&args.input, options)?))
+        }
         "csv" => {
             let data = |reason: String| Failure::Data(format!("{}: {reason}", args.input.display()));
             let text = crate::files::read_text(&args.input).map_err(|error| data(error.to_string()))?;
-            view::results(&text, args.measure.as_deref()).map_err(|error| match error {
+            let view =
+                View { name: name(&args.input), measure: args.measure.clone(), only: args.only.clone(), by: args.by.clone() };
+            view::figure_of_results(&text, &view).map_err(|error| match error {
                 ResultsError::Table(reason) => data(reason),
                 ResultsError::Choice(reason) => Failure::Usage(format!("{}: {reason}", args.input.display())),
-            })?
+            })
         }
-        _ => return Err(Failure::Usage(format!("{}: the name must end in .npz or .csv", args.input.display()))),
+        _ => Err(Failure::Usage(format!("{}: the name must end in .npz or .csv", args.input.display()))),
+    }
+}
+
+pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+    let to_stdout = args.out == Path::new("-");
+    let kind = if to_stdout { "svg" } else { extension(&args.out) };
+    if !["svg", "pdf", "png"].contains(&kind) {
+        return Err(Failure::Usage(format!("{}: the name must end in .svg, .pdf or .png", args.out.display())));
+    }
+    let file = if to_stdout { None } else { Some(pending(&args.out)?) };
+    let mut size = match args.size {
+        Format::Single => Size::SINGLE,
+        Format::Double => Size::DOUBLE,
+        Format::Screen => Size::SCREEN,
+    };
+    size.width_mm = args.width_mm.unwrap_or(size.width_mm);
+    let svg = figure(args, options)?.size(size).svg();
+    let failed = |reason: String| Failure::Data(format!("{}: {reason}", args.input.display()));
+    let bytes = match kind {
+        "pdf" => view::pdf(&svg).map_err(failed)?,
+        "png" => view::png(&svg, args.dpi).map_err(failed)?,
+        _ => svg.clone().into_bytes(),
     };
     match file {
         Some(file) => {
-            finish(file, svg.as_bytes())?;
+            finish(file, &bytes)?;
             options.remark(&format!("drawn to {}", args.out.display()));
         }
         None => print(&svg)?,

@@ -272,7 +272,11 @@ impl<'a> Layout<'a> {
         } else {
             0.04
         };
-        let x = Scale::over(figure.panels.iter().flat_map(Panel::x_values), margin);
+        let mut x = Scale::over(figure.panels.iter().flat_map(Panel::x_values), margin);
+        let shapes = figure.panels.iter().any(|p| p.equal_aspect);
+        if !shapes && x.low < 0.0 && figure.panels.iter().flat_map(Panel::x_values).all(|x| x >= 0.0) {
+            x.low = 0.0;
+        }
         let own = |panel: &Panel| panel.y_scale(panel.y_values());
         let y = match figure.panels.first().filter(|_| figure.multiples) {
             Some(first) => vec![first.y_scale(figure.panels.iter().flat_map(Panel::y_values)); figure.panels.len()],
@@ -365,9 +369,14 @@ impl<'a> Layout<'a> {
     /// What stands above the axes of a row: titles of panels, a legend of its own.
     fn head(&self, row: usize) -> f64 {
         let panels = || row * self.columns..((row + 1) * self.columns).min(self.figure.panels.len());
-        let title = panels().any(|i| !self.figure.panels[i].title.is_empty());
+        let title = panels().map(|i| self.panel_title(i).len()).max().unwrap_or(0);
         let legend = panels().map(|i| self.legend_rows(&self.own_legend(i)).1.len()).max().unwrap_or(0);
-        f64::from(u8::from(title)) * LINE * self.size + legend as f64 * LINE * self.size
+        (title + legend) as f64 * LINE * self.size
+    }
+
+    /// The lines of a panel's title.
+    fn panel_title(&self, index: usize) -> Vec<String> {
+        wrap(&self.figure.panels[index].title, self.size, self.panel_width() + 0.8 * self.size)
     }
 
     /// Room between a row and the next (pt).
@@ -506,17 +515,11 @@ impl<'a> Layout<'a> {
         let across = self.panel_width();
         let left = self.left + column as f64 * (across + size);
         let area = Area { left, top, right: left + across, bottom: top + self.heights[index] };
-        let mut above = top - self.head(row);
-        above = self.draw_legend(canvas, &self.own_legend(index), above).max(above);
-        if !panel.title.is_empty() {
-            let text = shorten(&panel.title, size, across + 0.8 * size);
-            canvas.text(
-                (area.left + area.right) / 2.0,
-                above.min(top - LINE * size) + 0.5 * LINE * size,
-                size,
-                Anchor::Middle,
-                &text,
-            );
+        self.draw_legend(canvas, &self.own_legend(index), top - self.head(row));
+        let lines = self.panel_title(index);
+        for (i, line) in lines.iter().enumerate() {
+            let middle = top - ((lines.len() - i) as f64 - 0.5) * LINE * size;
+            canvas.text((area.left + area.right) / 2.0, middle, size, Anchor::Middle, line);
         }
         let (mut x, mut y) = (self.x, self.y[index]);
         x.place(area.left, area.right);
@@ -537,9 +540,9 @@ impl<'a> Layout<'a> {
         // Numbers of the x axis stand below the lowest panel of each column.
         if index + self.columns >= self.figure.panels.len() {
             for (at, text) in panel.x_ticks(&x, across, size, &self.figure.x_texts) {
-                canvas.text(x.at(at), bottom + 2.0 + 0.6 * size, size, Anchor::Middle, &text);
+                canvas.text(x.at(at), bottom + 1.1 * size, size, Anchor::Middle, &text);
             }
-            bottom += 2.0 + 1.35 * size;
+            bottom += 1.8 * size;
         }
         canvas.out.push_str("</g>\n");
         bottom

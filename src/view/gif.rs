@@ -1,17 +1,27 @@
-//! A recording as an animated GIF.
+//! A recording as an animated GIF: every frame is drawn as SVG, with time, scale bar, voltages and their colours.
 
-use tiny_skia::{Color, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Rect, Stroke, Transform};
+use std::fmt::Write;
 
+use super::axis::ticks;
+use super::canvas::{Anchor, Canvas, Size};
+use super::image::pixels;
 use super::player::{on_ground, voltages};
+use super::text::{number, significant, width};
 use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
 
-/// Width of the picture (px).
-const WIDTH: u32 = 640;
 /// Frames per second; GIF counts in hundredths of a second.
 const FRAMES_PER_S: f64 = 25.0;
 /// Frames of a GIF at most.
 const FRAMES: usize = 1000;
+/// Pixels per inch; the picture is 640 pixels wide.
+const DPI: f64 = 96.0;
+const PAGE: Size = Size { width_mm: 640.0 / 96.0 * 25.4, font_pt: 9.0 };
+/// Thickness of the robot (pt).
+const ROBOT: f64 = 6.0;
+/// Height of what stands above and below the robot (pt).
+const HEAD: f64 = 30.0;
+const FOOT: f64 = 50.0;
 
 /// Draws the recording at `speed` (1: real time; by default, some seconds long) and encodes it, repeating for ever.
 ///
@@ -21,16 +31,18 @@ pub fn gif(recording: &Recording, speed: Option<f64>) -> Result<Vec<u8>, String>
     let duration = recording.time.last().copied().unwrap_or(0.0);
     let speed = speed.unwrap_or(duration / 6.0).max(1e-6);
     let count = ((duration / speed * FRAMES_PER_S).ceil() as usize).clamp(1, FRAMES);
-    let view = View::of(recording);
-    let mut out = Vec::new();
+    let scene = Scene::of(recording);
     let failed = |error: gif::EncodingError| error.to_string();
-    let mut encoder = gif::Encoder::new(&mut out, WIDTH as u16, view.height as u16, &[]).map_err(failed)?;
+    let first = pixels(&scene.svg(recording, 0), DPI)?;
+    let (across, high) = (first.width() as u16, first.height() as u16);
+    let mut out = Vec::new();
+    let mut encoder = gif::Encoder::new(&mut out, across, high, &[]).map_err(failed)?;
     encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
     for i in 0..count {
         let t = i as f64 * speed / FRAMES_PER_S;
         let record = recording.time.partition_point(|&time| time < t).min(recording.len() - 1);
-        let mut pixels = view.draw(recording, record).ok_or("the picture is too large")?.take();
-        let mut frame = gif::Frame::from_rgba_speed(WIDTH as u16, view.height as u16, &mut pixels, 20);
+        let mut pixels = pixels(&scene.svg(recording, record), DPI)?.take();
+        let mut frame = gif::Frame::from_rgba_speed(across, high, &mut pixels, 10);
         frame.delay = (100.0 / FRAMES_PER_S) as u16;
         encoder.write_frame(&frame).map_err(failed)?;
     }
@@ -39,78 +51,141 @@ pub fn gif(recording: &Recording, speed: Option<f64>) -> Result<Vec<u8>, String>
 }
 
 /// What part of the plane is shown, and how large.
-struct View {
+struct Scene {
     left: f64,
     bottom: f64,
+    /// Points of the page per mm of the robot.
     scale: f64,
-    height: u32,
-    largest_voltage: f64,
+    /// Height of the page (pt), and where the lower edge of the plane lies on it.
+    height: f64,
+    floor: f64,
+    lowest_voltage: f64,
+    highest_voltage: f64,
 }
 
-impl View {
+impl Scene {
     fn of(recording: &Recording) -> Self {
         let nodes = || (0..recording.len()).flat_map(|r| (0..recording.nodes()).map(move |n| (r, n)));
         let range = |axis: usize| {
-            nodes()
-                .map(|(r, n)| mm_from_cm(recording.node(r, n)[axis]))
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+            let values = nodes().map(|(r, n)| mm_from_cm(recording.node(r, n)[axis])).filter(|v| v.is_finite());
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+            if low > high { (0.0, 1.0) } else { (low, high) }
         };
-        let ((left, right), (bottom, top)) = (range(0), range(2));
+        let ((left, right), (low, top)) = (range(0), range(2));
         let pad = 0.04 * (right - left) + 2.0;
-        let scale = f64::from(WIDTH) / (right - left + 2.0 * pad);
-        let height = ((top - bottom + 2.0 * pad) * scale).clamp(90.0, 480.0);
-        let largest_voltage = recording.motor_voltages.iter().fold(1e-9_f64, |most, v| most.max(v.abs()));
+        let scale = PAGE.width() / (right - left + 2.0 * pad);
+        let bottom = if on_ground(recording) { 0.0 } else { low };
+        let inner = ((top - bottom) * scale + 2.0 * ROBOT).clamp(30.0, 330.0);
+        let m = recording.meta.motors_per_actuator as f64;
+        let volts = || recording.motor_voltages.iter().map(|v| v * m).filter(|v| v.is_finite());
         Self {
             left: left - pad,
-            bottom: bottom - pad,
+            bottom,
             scale,
-            height: height as u32,
-            largest_voltage: largest_voltage * recording.meta.motors_per_actuator as f64,
+            height: HEAD + inner + FOOT,
+            floor: HEAD + inner,
+            lowest_voltage: volts().fold(0.0, f64::min),
+            highest_voltage: volts().fold(0.0, f64::max),
         }
     }
 
-    fn at(&self, [x, _, z]: [f64; 3]) -> (f32, f32) {
+    /// Where a point is drawn: z is the height of the robot's lower face over the floor.
+    fn at(&self, [x, _, z]: [f64; 3]) -> (f64, f64) {
         let px = (mm_from_cm(x) - self.left) * self.scale;
-        let py = f64::from(self.height) - (mm_from_cm(z) - self.bottom) * self.scale;
-        (px as f32, py as f32)
+        let pz = self.floor - (mm_from_cm(z) - self.bottom) * self.scale - ROBOT / 2.0;
+        (px, pz)
     }
 
-    fn draw(&self, recording: &Recording, record: usize) -> Option<Pixmap> {
-        let mut map = Pixmap::new(WIDTH, self.height)?;
-        map.fill(Color::WHITE);
+    fn colour(&self, volts: f64) -> String {
+        let [r, g, b] = shade(volts / self.highest_voltage.max(-self.lowest_voltage).max(1e-9));
+        format!("#{r:02x}{g:02x}{b:02x}")
+    }
+
+    fn svg(&self, recording: &Recording, record: usize) -> String {
+        let mut canvas = Canvas::default();
+        let (size, right) = (PAGE.font_pt, PAGE.width());
+        canvas.text(8.0, 12.0, size, Anchor::Start, &format!("time {} ms", number(1e3 * recording.time[record], 1)));
+        let bar = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].into_iter().find(|mm| f64::from(*mm) * self.scale > 45.0);
+        let bar = f64::from(bar.unwrap_or(2000));
+        let from = right - 8.0 - bar * self.scale;
+        canvas.line((from, 19.0), (right - 8.0, 19.0), "#111", 1.5);
+        canvas.text(right - 8.0, 11.0, size, Anchor::End, &format!("{bar} mm"));
         if on_ground(recording) {
-            let (_, floor) = self.at([0.0, 0.0, -0.05]);
-            let below = Rect::from_xywh(0.0, floor, WIDTH as f32, (self.height as f32 - floor).max(1.0))?;
-            map.fill_rect(below, &paint([225, 225, 225]), Transform::identity(), None);
+            canvas.floor(0.0, right, self.floor);
         }
         let volts = voltages(recording, record);
+        self.robot(&mut canvas, recording, record, &volts);
+        self.numbers(&mut canvas, recording, record, &volts);
+        self.key(&mut canvas);
+        canvas.document(PAGE, self.height, "animation")
+    }
+
+    fn robot(&self, canvas: &mut Canvas, recording: &Recording, record: usize, volts: &[f64]) {
         let (m, last) = (recording.meta.motors_per_actuator, recording.nodes() - 1);
         let node = |n: usize| self.at(recording.node(record, n));
         let half = |a: usize, b: usize| ((node(a).0 + node(b).0) / 2.0, (node(a).1 + node(b).1) / 2.0);
-        let thickness = self.scale.max(3.0) as f32;
-        for (extra, coloured) in [(2.0, false), (0.0, true)] {
+        for outline in [true, false] {
             for (a, &v) in volts.iter().enumerate() {
                 // An actuator reaches from half a link before its first joint to half a link after its last.
                 let first = a * m + 1;
                 let begin = if a == 0 { node(0) } else { half(first - 1, first) };
                 let end = if first + m == last { node(last) } else { half(first + m - 1, first + m) };
-                let mut path = PathBuilder::new();
-                path.move_to(begin.0, begin.1);
-                (first..first + m).map(node).chain([end]).for_each(|(x, y)| path.line_to(x, y));
-                let stroke =
-                    Stroke { width: thickness + extra, line_cap: LineCap::Butt, line_join: LineJoin::Round, ..Stroke::default() };
-                let colour = if coloured { shade(v / self.largest_voltage) } else { [34, 34, 34] };
-                map.stroke_path(&path.finish()?, &paint(colour), &stroke, Transform::identity(), None);
+                let points = [begin].into_iter().chain((first..first + m).map(node)).chain([end]);
+                let points: Vec<String> = points.map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
+                let (colour, thick) = if outline { ("#222".into(), ROBOT) } else { (self.colour(v), ROBOT - 1.6) };
+                let _ = writeln!(
+                    canvas.out,
+                    r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="{thick}" stroke-linejoin="round"/>"#,
+                    points.join(" ")
+                );
             }
         }
-        Some(map)
     }
-}
 
-fn paint(colour: [u8; 3]) -> Paint<'static> {
-    let mut paint = Paint { anti_alias: true, ..Paint::default() };
-    paint.set_color_rgba8(colour[0], colour[1], colour[2], 255);
-    paint
+    /// The voltage of each actuator below its middle, if there is room for all.
+    fn numbers(&self, canvas: &mut Canvas, recording: &Recording, record: usize, volts: &[f64]) {
+        let m = recording.meta.motors_per_actuator;
+        let middle = |a: usize| self.at(recording.node(record, a * m + m.div_ceil(2))).0;
+        let texts: Vec<_> =
+            volts.iter().enumerate().map(|(a, v)| (middle(a), format!("{} V", significant(v.round(), 6)))).collect();
+        let clear =
+            |w: &[(f64, String)]| w[1].0 - w[0].0 > (width(&w[0].1, PAGE.font_pt) + width(&w[1].1, PAGE.font_pt)) / 2.0 + 4.0;
+        if texts.windows(2).all(clear) {
+            for (x, text) in texts {
+                canvas.text(x, self.floor + 12.0, PAGE.font_pt, Anchor::Middle, &text);
+            }
+        }
+    }
+
+    /// Colours of the voltages with numbers.
+    fn key(&self, canvas: &mut Canvas) {
+        const STEPS: usize = 48;
+        let (size, top) = (PAGE.font_pt, self.floor + 22.0);
+        let (left, right) = (PAGE.width() * 0.36, PAGE.width() * 0.9);
+        canvas.text(left - 8.0, top + 5.0, size, Anchor::End, "colour: voltage (V)");
+        let (low, high) = (self.lowest_voltage, self.highest_voltage.max(self.lowest_voltage + 1e-9));
+        for step in 0..STEPS {
+            let share = step as f64 / STEPS as f64;
+            let colour = self.colour(low + (step as f64 + 0.5) / STEPS as f64 * (high - low));
+            let x = left + share * (right - left);
+            let _ =
+                writeln!(canvas.out, r#"<rect x="{x:.2}" y="{top:.2}" width="{:.2}" height="8" fill="{colour}"/>"#, right - x);
+        }
+        let _ = writeln!(
+            canvas.out,
+            r##"<rect x="{left:.2}" y="{top:.2}" width="{:.2}" height="8" fill="none" stroke="#111" stroke-width="0.6"/>"##,
+            right - left
+        );
+        if self.highest_voltage > self.lowest_voltage {
+            let (values, digits) = ticks(low, high, 5);
+            for value in values {
+                let x = left + (value - low) / (high - low) * (right - left);
+                canvas.text(x, top + 15.0, size, Anchor::Middle, &number(value, digits));
+            }
+        } else {
+            canvas.text((left + right) / 2.0, top + 15.0, size, Anchor::Middle, "0");
+        }
+    }
 }
 
 /// Light grey for 0 V, towards blue for negative and red for positive voltages.

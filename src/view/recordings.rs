@@ -22,8 +22,26 @@ pub enum Kind {
 const SHAPES: usize = 6;
 
 impl Kind {
+    /// Draws the figure with a title that begins with the experiment's name, and its settings below.
+    pub fn titled(self, name: &str, recording: &Recording) -> Figure {
+        let mut figure = self.figure(recording);
+        let what = match self {
+            Self::Shapes => "shapes over time",
+            Self::Traces => "heights, travel and voltages",
+            Self::Spectrum => "amplitude spectra of heights",
+        };
+        figure.title(&format!("{name}: {what}"));
+        figure
+    }
+
     /// Draws the figure.
     pub fn figure(self, recording: &Recording) -> Figure {
+        let mut figure = self.plain(recording);
+        figure.setting(&setting(recording));
+        figure
+    }
+
+    fn plain(self, recording: &Recording) -> Figure {
         match self {
             Self::Shapes => {
                 let last = recording.len().saturating_sub(1);
@@ -51,6 +69,23 @@ pub fn shapes(title: &str, recording: &Recording, records: &[usize]) -> Figure {
         figure.robot("", shape(recording, record), "#0072b2");
     }
     figure
+}
+
+/// What a recording says of its experiment.
+fn setting(recording: &Recording) -> String {
+    let meta = &recording.meta;
+    let plural = |n: usize, thing: &str| format!("{n} {thing}{}", if n == 1 { "" } else { "s" });
+    let mut parts = vec![plural(meta.actuators, "actuator"), format!("m = {}", meta.motors_per_actuator)];
+    // A drive without a frequency is recorded as one of 1 Hz.
+    if meta.driven_frequency.is_finite() && meta.driven_frequency > 0.0 && meta.driven_frequency != 1.0 {
+        parts.push(format!("{} Hz", significant(meta.driven_frequency, 4)));
+    }
+    parts.push(format!("damping_eta = {}", significant(meta.damping_eta, 4)));
+    if let Some(ground) = &meta.ground {
+        let (low, high) = (significant(ground.friction_low, 3), significant(ground.friction_high, 3));
+        parts.push(if low == high { format!("friction {low}") } else { format!("friction {low} and {high}") });
+    }
+    parts.join(", ")
 }
 
 /// The nodes of one record, x and z (mm).

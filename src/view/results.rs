@@ -65,7 +65,7 @@ pub struct View {
 }
 
 /// Panels of a figure at most.
-const PANELS: usize = 12;
+const PANELS: usize = 20;
 /// Curves of a panel at most; a map shows more.
 const CURVES: usize = 5;
 
