@@ -376,7 +376,7 @@ impl<'a> Layout<'a> {
 
     /// The lines of a panel's title.
     fn panel_title(&self, index: usize) -> Vec<String> {
-        wrap(&self.figure.panels[index].title, self.size, self.panel_width() + 0.8 * self.size)
+        wrap(&self.figure.panels[index].title, self.size, self.panel_width())
     }
 
     /// Room between a row and the next (pt).
