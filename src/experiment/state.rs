@@ -8,7 +8,7 @@ use crate::engine::{Engine, EngineError};
 use crate::words;
 
 /// Largest size of a number of a state (CGS): its square times any constant of a robot is a number.
-const LARGEST: f64 = 1e100;
+const LARGEST: f64 = 1e30;
 
 /// A state between two steps, as a JSON object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -19,8 +19,20 @@ use crate::supervise::LIMIT;
 use crate::{data, files, results, settings};
 
 /// Keys of the commands' JSON that are null where they do not apply.
-const OPTIONAL: &[&str] =
-    &["energy", "step_choice", "out", "fault", "link", "results", "difference", "default", "off", "parting"];
+const OPTIONAL: &[&str] = &[
+    "energy",
+    "step_choice",
+    "out",
+    "fault",
+    "link",
+    "results",
+    "difference",
+    "default",
+    "off",
+    "parting",
+    "sweep",
+    "largest_ulp",
+];
 
 /// Most steps times joints of an experiment that is run here.
 const WORK: f64 = 2e4;

@@ -199,7 +199,7 @@ pub fn give_recording(input: &Input, _: &Path, random: &mut Random) -> Outcome {
             outputs::table("CSV", &bytes, false)?;
             if random.once_in(4) {
                 let report = serde_json::to_value(compare(&RECORDED, &recording)).map_err(|error| error.to_string())?;
-                outputs::json("report", &report, &["difference"])?;
+                outputs::json("report", &report, &["difference", "largest_ulp"])?;
             }
             Ok(Fate::Accepted)
         }
