@@ -204,7 +204,7 @@ pub fn merge(folder: &Path, sweep: &Sweep) -> Result<PathBuf, RowError> {
         let path = entry.map_err(io(folder))?.path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         if name.starts_with("rows-") && name.ends_with(".csv") {
-            let bytes = std::fs::read(&path).map_err(io(&path))?;
+            let bytes = files::read(&path).map_err(io(&path))?;
             let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
             all.append(&mut parse(&path, &bytes[..whole], sweep)?);
         }
