@@ -81,7 +81,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
             return Err(Fault::new(key, "belongs to engine = \"planar\"; Bullet has none").into());
         }
         if !(damping.is_finite() && damping >= 0.0) {
-            return Err(Fault::new(key, format!("is {damping}, but must be a number from 0 on")).into());
+            return Err(Fault::new(key, format!("is {}, but must be zero or more", number(damping))).into());
         }
     }
     if let Some(StepConfig::Word(word)) = &s.time_step_s {
