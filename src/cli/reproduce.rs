@@ -69,7 +69,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let cost: f64 = studies.iter().map(|study| study.cost_s[usize::from(!args.quick)]).sum();
     options.remark(&format!("{} results, about {:.0} min on {jobs} threads", studies.len(), (cost / jobs as f64 / 60.0).ceil()));
 
-    let bench = Bench { effort, jobs, folder: &rows, stop: &INTERRUPT };
+    let bench = Bench::new(effort, jobs, &rows, &INTERRUPT);
     let mut results: Vec<(Study, Result<Findings, String>)> = Vec::new();
     for study in studies {
         let start = Instant::now();
@@ -95,11 +95,14 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let entries: Vec<_> = results
         .iter()
         .map(|(study, result)| match result {
-            Ok(findings) => json!({"id": study.id, "title": study.title, "comparisons": findings.comparisons}),
+            Ok(findings) => json!({
+                "id": study.id, "title": study.title, "engines": findings.engines,
+                "published": findings.published, "comparisons": findings.comparisons,
+            }),
             Err(reason) => json!({"id": study.id, "title": study.title, "failed": reason}),
         })
         .collect();
-    let object = json!({"schema": 1, "made_by": made_by, "results": entries});
+    let object = json!({"schema": 2, "made_by": made_by, "results": entries});
     write(&folder.join("results.json"), &format!("{object:#}\n"))?;
     if options.json {
         print(&format!("{object}\n"))?;

@@ -1,6 +1,6 @@
 //! The paper's results beside this program's: one id each, a table and a figure each, one page for all.
 //!
-//! The runs are those of the planar engine; beside every figure some of them are repeated on Bullet.
+//! The runs are those of the planar engine; in every study some of them are repeated on Bullet.
 
 mod cantilever;
 mod jumping;
@@ -9,6 +9,8 @@ mod walking;
 
 pub use page::{page, table};
 
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,6 +20,10 @@ use thiserror::Error;
 use crate::engine::EngineError;
 use crate::experiment::{self, ConfigError, Control, Experiment, Run, Source, presets};
 use crate::sweep::{self, Row as Point, RowError, Rows, Sweep};
+use crate::view::{Figure, Mark, fixed, signed, significant};
+
+/// Colour of lines that stand for published values.
+const PUBLISHED: &str = "#777777";
 
 /// How carefully a study is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,18 +56,45 @@ pub enum StudyError {
 }
 
 /// One published result beside ours.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Comparison {
     /// What is compared.
     pub quantity: String,
-    /// As published, and how it was had.
+    /// As published, and how it was had; empty for what was not published.
     pub published: String,
-    /// As simulated here.
+    /// As simulated here, on the planar engine.
     pub ours: String,
-    /// The difference.
+    /// What that differs from the published value by.
     pub difference: String,
-    /// What explains it, or what is not specified.
+    /// The same on Bullet, and what the planar engine differs from it by: a spot check, empty where none was made.
+    pub bullet: String,
+    /// What explains the difference, or what is not specified.
     pub explanation: String,
+}
+
+/// How a published value was had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// In an experiment.
+    Measured,
+    /// By the authors' simulation.
+    Simulated,
+}
+
+/// A published value as it stands in a study's figure, in the units of its axes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Published {
+    /// Its name in the legend.
+    pub label: String,
+    /// How it was had.
+    pub origin: Origin,
+    /// Where it stands along x; absent for a value of y alone, drawn as a line across.
+    pub x: Option<f64>,
+    /// Where it stands along y; absent for a value of x alone, drawn as a line up.
+    pub y: Option<f64>,
+    /// ± of y, where the source gives it.
+    pub plus_minus: Option<f64>,
 }
 
 /// What a study found.
@@ -69,6 +102,10 @@ pub struct Comparison {
 pub struct Findings {
     /// The table.
     pub comparisons: Vec<Comparison>,
+    /// Published values that the figure shows.
+    pub published: Vec<Published>,
+    /// Which engine did what, by which time steps.
+    pub engines: String,
     /// The figure, as SVG.
     pub figure: String,
     /// What the figure shows, in a sentence or two.
@@ -89,27 +126,58 @@ impl Findings {
             published: published.into(),
             ours: ours.into(),
             difference: difference.into(),
+            bullet: String::new(),
             explanation: explanation.into(),
         });
     }
-}
 
-impl Findings {
-    /// A spot check: a number of the planar engine and the same on Bullet.
-    fn check_on_bullet(&mut self, quantity: &str, unit: &str, planar: f64, bullet: f64) {
-        let told = if bullet.is_finite() {
-            (format!("{bullet:.2} {unit} on Bullet"), format!("planar engine {:+.2} {unit}", planar - bullet))
-        } else {
-            ("none on Bullet: its contact makes energy, or it limits a velocity".into(), String::new())
+    /// A spot check of the last comparison: its number on the planar engine and on Bullet.
+    fn check_on_bullet(&mut self, unit: &str, planar: f64, bullet: f64) {
+        let Some(last) = self.comparisons.last_mut() else { return };
+        last.bullet = match (bullet.is_finite(), planar.is_finite()) {
+            (true, true) => format!("{} {unit} (planar {})", fixed(bullet, 2), signed(planar - bullet, 2)),
+            (true, false) => format!("{} {unit}", fixed(bullet, 2)),
+            (false, _) => "none: its contact makes energy, or it limits a velocity".into(),
         };
-        self.compare(quantity, "spot check", told.0, told.1, "");
     }
 
     /// Says which frequencies of a scan gave no result, and why.
     fn without_result(&mut self, points: &[(f64, f64)]) {
         let lost: Vec<String> = points.iter().filter(|p| !p.1.is_finite()).map(|p| format!("{}", p.0)).collect();
         if !lost.is_empty() {
-            self.compare("frequencies without a result", "–", format!("{} Hz", lost.join(", ")), "", "The rows on disk say why.");
+            self.compare("frequencies without a result", "", format!("{} Hz", lost.join(", ")), "", "The rows on disk say why.");
+        }
+    }
+
+    /// Draws published points, with their ±.
+    fn publish(&mut self, figure: &mut Figure, label: &str, origin: Origin, points: &[(f64, f64)], plus_minus: Option<f64>) {
+        figure.series(label, points.iter().copied(), Mark::Points);
+        for &(x, y) in points {
+            if let Some(spread) = plus_minus {
+                figure.line("", [(x, y - spread), (x, y + spread)], PUBLISHED, 1.2);
+            }
+            self.published.push(Published { label: label.into(), origin, x: Some(x), y: Some(y), plus_minus });
+        }
+    }
+
+    /// Draws a published value of y as a line across from one x to another.
+    fn publish_across(&mut self, figure: &mut Figure, label: &str, origin: Origin, y: f64, [from, to]: [f64; 2]) {
+        figure.line("", [(from, y), (to, y)], PUBLISHED, 1.2).note(from, y, label);
+        self.published.push(Published { label: label.into(), origin, x: None, y: Some(y), plus_minus: None });
+    }
+
+    /// Draws a published value of x as a line up from one y to another.
+    fn publish_up(&mut self, figure: &mut Figure, label: &str, origin: Origin, x: f64, [from, to]: [f64; 2]) {
+        figure.line("", [(x, from), (x, to)], PUBLISHED, 1.2).note(x, to, label);
+        self.published.push(Published { label: label.into(), origin, x: Some(x), y: None, plus_minus: None });
+    }
+
+    /// Says which engines did the runs.
+    fn done_on(&mut self, planar: &Experiment, bullet: Option<f64>) {
+        let step = |step: f64| format!("time step {} µs", significant(1e6 * step, 3));
+        self.engines = format!("Ours: planar engine, {}.", step(planar.time_step));
+        if let Some(bullet) = bullet {
+            self.engines += &format!(" Spot checks: Bullet, {}.", step(bullet));
         }
     }
 }
@@ -210,16 +278,28 @@ pub struct Bench<'a> {
     pub folder: &'a Path,
     /// Set to stop.
     pub stop: &'a AtomicBool,
+    /// Runs by preset and settings: an experiment that several studies speak of is done once.
+    done: RefCell<HashMap<String, (Experiment, Run)>>,
 }
 
-impl Bench<'_> {
+impl<'a> Bench<'a> {
+    /// A bench on which nothing has been done.
+    pub fn new(effort: Effort, jobs: usize, folder: &'a Path, stop: &'a AtomicBool) -> Self {
+        Self { effort, jobs, folder, stop, done: RefCell::default() }
+    }
+
+    /// Time step of single runs on the planar engine (s).
+    fn time_step(&self) -> f64 {
+        match self.effort {
+            Effort::Quick => 2e-5,
+            Effort::Full => 4e-6,
+        }
+    }
+
     /// Runs a preset with settings on the planar engine.
     fn run(&self, preset: &str, settings: &[&str]) -> Result<(Experiment, Run), StudyError> {
-        let step = match self.effort {
-            Effort::Quick => "simulation.time_step_s=2e-5",
-            Effort::Full => "simulation.time_step_s=4e-6",
-        };
-        self.run_as(preset, &[settings, &["simulation.engine=planar", step]].concat())
+        let step = format!("simulation.time_step_s={:e}", self.time_step());
+        self.run_as(preset, &[settings, &["simulation.engine=planar", &step]].concat())
     }
 
     /// The same on Bullet at the preset's time step.
@@ -228,6 +308,10 @@ impl Bench<'_> {
     }
 
     fn run_as(&self, preset: &str, settings: &[&str]) -> Result<(Experiment, Run), StudyError> {
+        let name = format!("{preset} {}", settings.join(" "));
+        if let Some(done) = self.done.borrow().get(&name) {
+            return Ok(done.clone());
+        }
         let text = presets::find(preset).map_or("", |preset| preset.text);
         let mut source = Source::from_text(preset, text);
         for setting in settings {
@@ -241,7 +325,10 @@ impl Bench<'_> {
         }
         match run.trouble(&experiment).pop() {
             Some(trouble) => Err(StudyError::Trouble(trouble)),
-            None => Ok((experiment, run)),
+            None => {
+                self.done.borrow_mut().insert(name, (experiment.clone(), run.clone()));
+                Ok((experiment, run))
+            }
         }
     }
 
@@ -249,6 +336,14 @@ impl Bench<'_> {
     fn sweep(&self, id: &str, preset: &str, settings: &[&str]) -> Result<(Sweep, Vec<Point>), StudyError> {
         let settings: Vec<String> = settings.iter().map(|setting| (*setting).to_owned()).collect();
         self.points(id, Sweep::open(Path::new(&format!("preset:{preset}")), &settings)?)
+    }
+
+    /// A built-in sweep with the time step of single runs, so that its points are theirs.
+    fn sweep_of_runs(&self, id: &str, preset: &str, settings: &[&str]) -> Result<(Sweep, Vec<Point>), StudyError> {
+        let settings: Vec<String> = settings.iter().map(|setting| (*setting).to_owned()).collect();
+        let mut sweep = Sweep::open(Path::new(&format!("preset:{preset}")), &settings)?;
+        set_time_step(&mut sweep, self.time_step());
+        self.compute(id, sweep)
     }
 
     /// The same of any sweep.
@@ -263,11 +358,7 @@ impl Bench<'_> {
     fn spots(&self, id: &str, sweep: &Sweep, step: f64, values: &[f64]) -> Result<Vec<(f64, f64)>, StudyError> {
         let mut sweep = sweep.clone();
         sweep.source.set("simulation.engine=bullet")?;
-        for axis in &mut sweep.axes {
-            if axis.key == "simulation.time_step_s" {
-                axis.values = vec![step.into()];
-            }
-        }
+        set_time_step(&mut sweep, step);
         if let Some(axis) = sweep.axes.last_mut() {
             axis.values = values.iter().map(|value| (*value).into()).collect();
         }
@@ -285,6 +376,13 @@ impl Bench<'_> {
         sweep::merge(&folder, &sweep)?;
         let points = Rows::open(&folder, &sweep, 1, 1)?.done().values().cloned().collect();
         Ok((sweep, points))
+    }
+}
+
+/// Sets the time step (s) of a sweep that has an axis for it.
+fn set_time_step(sweep: &mut Sweep, step: f64) {
+    for axis in sweep.axes.iter_mut().filter(|axis| axis.key == "simulation.time_step_s") {
+        axis.values = vec![step.into()];
     }
 }
 
