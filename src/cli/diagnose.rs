@@ -111,9 +111,12 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let start = Instant::now();
     let progress = |what: &str| bar.set_message(what.to_owned());
+    let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
     let result = pool.install(|| {
         if dataset.runs.is_empty() {
-            return observations::diagnose(dataset, &progress).map(|found| (found, None));
+            let found = observations::diagnose(dataset, &progress)?;
+            let page = observations::page(&found, dataset, &command);
+            return Ok((found.diagnosis, None, page));
         }
         let checked = quality::check(dataset);
         let plant = RobotPlant::new(dataset, &checked);
@@ -121,13 +124,12 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
         let separate = |models: &[crate::diagnose::plant::Model]| protocols::separate(&plant, models);
         let outcome = verdict::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), &progress, &separate)?;
         let files = extended::Files::new(dataset, &plant, &outcome);
-        let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
-        let context = report::Context { plant: &plant, command: &command, extended: &files.experiment };
+        let context = report::Context { plant: &plant, robot: &dataset.robot, command: &command, extended: &files.experiment };
         let page = report::page(&outcome, &context);
-        Ok((outcome.diagnosis, Some((files, page))))
+        Ok((outcome.diagnosis, Some(files), page))
     });
     bar.finish_and_clear();
-    let (diagnosis, files) = result.map_err(Failure::Simulation)?;
+    let (diagnosis, files, page) = result.map_err(Failure::Simulation)?;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(&args.out, &error))?;
     let printed = if options.json {
         print(&format!("{json}\n"))
@@ -142,14 +144,12 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
         print(&text)
     };
     work().writing = true;
-    if let Some((files, page)) = files {
+    if let Some(files) = files {
         write(&args.out, "extended.toml", &files.experiment)?;
         write(&args.out, "drive.csv", &files.drive)?;
         write(&args.out, "residuals.csv", &files.residuals)?;
-        write(&args.out, "report.html", &page)?;
-    } else {
-        write(&args.out, "report.html", &observations::page(&diagnosis))?;
     }
+    write(&args.out, "report.html", &page)?;
     write(&args.out, "diagnosis.json", &format!("{json}\n"))?;
     options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
     printed?;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::names;
 use super::tests::ResidualTest;
 
 /// What the data say.
@@ -31,18 +32,6 @@ pub struct Estimate {
     pub ci95: [Option<f64>; 2],
     /// Whether it stands at the end of its range.
     pub at_bound: bool,
-}
-
-impl Estimate {
-    /// Name, value, range and unit.
-    pub(super) fn words(&self) -> String {
-        let range = match self.ci95 {
-            [Some(low), Some(high)] if low == high => return format!("{} = {}", self.name, self.value),
-            [Some(low), Some(high)] => format!(" ({low:.4} to {high:.4})"),
-            _ => String::new(),
-        };
-        format!("{} = {:.4}{range}{}{}", self.name, self.value, if self.unit.is_empty() { "" } else { " " }, self.unit)
-    }
 }
 
 /// A cause that the data ask for.
@@ -100,6 +89,9 @@ pub struct Stage {
 pub struct Ranked {
     /// The candidate.
     pub id: String,
+    /// Which form of it, for causes that have several.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub form: String,
     /// Error of the held-out runs with it.
     pub rmse_heldout_mm: f64,
     /// Change of Bayes's information criterion against re-tuned constants alone; negative is better.
@@ -154,7 +146,39 @@ pub struct Diagnosis {
     pub remarks: Vec<String>,
 }
 
-/// The verdict in a sentence.
+/// Share of tests that noise alone fails.
+const FAILED_BY_CHANCE: f64 = 1e-3;
+/// More tests fail than chance explains if noise alone fails as many in less than this share of cases.
+const BEYOND_CHANCE: f64 = 1e-3;
+
+/// Which residual tests fail, in words, if more do than noise alone would.
+pub fn failing(tests: &[ResidualTest]) -> Option<String> {
+    let failed: Vec<&ResidualTest> = tests.iter().filter(|test| !test.passed).collect();
+    let (count, n) = (failed.len(), tests.len() as f64);
+    // The chance of fewer failures, from the binomial distribution.
+    let mut term = (1.0 - FAILED_BY_CHANCE).powf(n);
+    let mut fewer = 0.0;
+    for k in 0..count {
+        fewer += term;
+        term *= (n - k as f64) / (k as f64 + 1.0) * FAILED_BY_CHANCE / (1.0 - FAILED_BY_CHANCE);
+    }
+    if 1.0 - fewer >= BEYOND_CHANCE {
+        return None;
+    }
+    let mut names: Vec<(&str, usize)> = Vec::new();
+    for test in failed {
+        match names.iter_mut().find(|(name, _)| *name == test.name) {
+            Some((_, times)) => *times += 1,
+            None => names.push((&test.name, 1)),
+        }
+    }
+    names.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
+    let list: Vec<String> = names.iter().map(|(name, times)| format!("{name} {times}")).collect();
+    let verb = if count == 1 { "fails" } else { "fail" };
+    Some(format!("{count} of {} residual tests still {verb}, more than chance explains ({})", tests.len(), list.join(", ")))
+}
+
+/// The verdict in a sentence. `failing` is what [`failing`] says of the extended model.
 pub(super) fn summary(
     verdict: Verdict,
     effects: &[Adopted],
@@ -162,35 +186,87 @@ pub(super) fn summary(
     poor: Option<&str>,
     resolution: f64,
     refined: bool,
+    failing: Option<&str>,
 ) -> String {
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
+    let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
     let name = |effect: &Adopted| {
-        let numbers: Vec<_> = effect.parameters.iter().map(Estimate::words).collect();
-        format!("{} ({})", effect.id, numbers.join(", "))
+        let numbers: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();
+        format!("{} ({})", names::with_form(&effect.id, &names::form_of(effect)), numbers.join("; "))
     };
     let physics: Vec<&Adopted> = effects.iter().filter(|effect| effect.id != "discretisation").collect();
-    let names = physics.iter().map(|effect| name(effect)).collect::<Vec<_>>().join("; ");
+    let named = physics.iter().map(|effect| name(effect)).collect::<Vec<_>>().join("; ");
     match verdict {
-        Verdict::None => match poor {
-            Some(poor) => format!("Nothing stands out, but {poor}."),
-            None => format!("Nothing is missing: the nominal model{finely} explains the data to the noise."),
+        Verdict::None => match (poor, failing) {
+            (Some(poor), _) => format!("Nothing stands out, but {poor}{}.", but.replacen(", but", ", and", 1)),
+            (None, None) => format!("Nothing is missing: the nominal model{finely} explains the data to the noise."),
+            (None, Some(failing)) => format!(
+                "Nothing that the library knows is missing, and the nominal model{finely} leaves no more than the size of the noise, but {failing}."
+            ),
         },
-        Verdict::Named => format!("The simulation lacks {names}."),
+        Verdict::Named => format!("The simulation lacks: {named}{but}."),
         Verdict::Tied => {
             let ties: Vec<_> = physics
                 .iter()
                 .filter(|effect| !effect.tied_with.is_empty())
-                .map(|effect| format!("{} cannot be told from {}", effect.id, effect.tied_with.join(", ")))
+                .map(|effect| {
+                    let others: Vec<String> = effect.tied_with.iter().map(|id| names::cause(id)).collect();
+                    format!("{} cannot be told from {}", names::cause(&effect.id), others.join(", "))
+                })
                 .collect();
-            format!("The simulation lacks {names}; in these data {}.", ties.join("; "))
+            format!("The simulation lacks: {named}; in these data {}{but}.", ties.join("; "))
         }
         Verdict::Unexplained => match (poor, physics.is_empty()) {
-            (Some(poor), _) => format!("The nominal model does not explain the data, and {poor}."),
-            (None, true) => "Something is wrong that nothing in the library explains.".into(),
+            (Some(poor), _) => {
+                format!("The nominal model does not explain the data, and {poor}{}.", but.replacen(", but", ", and", 1))
+            }
+            (None, true) => format!("Something is wrong that nothing in the library explains{}.", but.replacen(", but", ":", 1)),
             (None, false) => format!(
-                "{names} explains a part, but {:.0} % of the misfit is left that nothing in the library explains.",
-                100.0 * left
+                "{named} explains a part, but {:.0} % of the misfit is left that nothing in the library explains{}.",
+                100.0 * left,
+                but.replacen(", but", ", and", 1)
             ),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tests(count: usize, failed: usize) -> Vec<ResidualTest> {
+        let test = |index: usize| ResidualTest {
+            name: if index == 0 { "loop area" } else { "drift in log time" }.into(),
+            run: index.to_string(),
+            statistic: 1.0,
+            limit: 0.5,
+            passed: index >= failed,
+            meaning: String::new(),
+        };
+        (0..count).map(test).collect()
+    }
+
+    #[test]
+    fn tests_that_fail_by_chance_are_not_counted_against_a_model() {
+        // Of 80 tests noise alone fails two or more in 0.3 % of cases, three or more in 0.008 %.
+        assert_eq!(failing(&tests(80, 0)), None);
+        assert_eq!(failing(&tests(80, 2)), None);
+        assert!(failing(&tests(80, 3)).is_some() && failing(&tests(5, 2)).is_some());
+        assert!(failing(&tests(1000, 3)).is_none());
+    }
+
+    #[test]
+    fn the_first_sentence_of_every_verdict_names_tests_that_fail_beyond_chance() {
+        let words = failing(&tests(80, 3)).unwrap();
+        assert_eq!(words, "3 of 80 residual tests still fail, more than chance explains (drift in log time 2, loop area 1)");
+        for verdict in [Verdict::None, Verdict::Named, Verdict::Tied, Verdict::Unexplained] {
+            for poor in [None, Some("one run is too little")] {
+                let first = |failing| summary(verdict, &[], 0.3, poor, 10.0, true, failing);
+                assert!(first(Some(words.as_str())).split(". ").next().unwrap().contains(&words), "{verdict:?}");
+                assert!(!first(None).contains("residual tests"));
+            }
+        }
+        let honest = summary(Verdict::None, &[], 0.0, None, 3.0, false, Some(&words));
+        assert!(!honest.contains("explains the data"), "{honest}");
     }
 }

@@ -4,14 +4,16 @@
 //! that the loop knows of the thing that was measured; [`robot`] makes our robots one. [`fit`] does least squares, [`search`] screens candidates,
 //! adds and takes out causes and judges them on runs that no fit saw, and [`verdict`] puts it together: numerics before constants, constants and
 //! measurement errors before physics, ties named as ties, and what is left described ([`tests`]) in a [`diagnosis`]. [`protocols`] proposes what to measure next;
-//! [`report`] and [`extended`] write it down; [`observations`] does what can be done with single published numbers.
+//! [`report`] and [`extended`] write it down, in the words of [`names`]; [`observations`] does what can be done with single published numbers.
 
 pub mod dataset;
 pub mod diagnosis;
 pub mod extended;
 pub mod fit;
 mod intervals;
+pub mod names;
 pub mod observations;
+mod picture;
 pub mod plant;
 pub mod protocols;
 pub mod quality;

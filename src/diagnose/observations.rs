@@ -6,12 +6,13 @@ use super::dataset::{Dataset, Observation};
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
 use super::fit::{Bench, Care, Fit};
 use super::plant::{Candidate, Model, Plant, Signal, Term};
-use super::robot;
+use super::{names, report, robot};
 use crate::experiment::{self, Config, ConfigError, Control, EffectConfig, Source};
 use crate::model::Mount;
 use crate::recording::definitions;
 use crate::recording::measures::Measures;
-use crate::view::escape;
+use crate::view::page::{Cell, Table, document};
+use crate::view::{digits_for, escape, fixed, label_of, signed};
 use crate::words;
 
 /// A model explains the numbers if each lies within two standard deviations, in the mean.
@@ -181,11 +182,49 @@ impl Plant for Numbers<'_> {
     }
 }
 
+/// One measured number beside the models, in the measure's unit.
+struct Number {
+    measure: String,
+    /// What it was measured under.
+    setting: String,
+    value: f64,
+    sigma: f64,
+    nominal: f64,
+    best: f64,
+}
+
+/// A way to reach the numbers: one cause or two constants, and the misfit left (standard deviations, rms).
+struct Way {
+    effects: Vec<Adopted>,
+    misfit: f64,
+}
+
+/// What single numbers say.
+pub struct Found {
+    /// In the form that all diagnoses have.
+    pub diagnosis: Diagnosis,
+    numbers: Vec<Number>,
+    ways: Vec<Way>,
+}
+
+/// The drive of a number in words.
+fn setting(observation: &Observation) -> String {
+    let drive = &observation.drive;
+    let volts = drive.voltages_v.clone().or(drive.amplitudes_v.clone()).or(drive.amplitude_v.map(|volts| vec![volts]));
+    let volts = volts.unwrap_or_default().iter().map(|volts| fixed(*volts, 0)).collect::<Vec<_>>().join(", ");
+    let waveform = match drive.waveform.as_deref().or(drive.gait.as_deref()) {
+        Some("dc") => "constant voltage",
+        Some(name) => name,
+        None => "gait",
+    };
+    if volts.is_empty() { waveform.into() } else { format!("{waveform}, {volts} V") }
+}
+
 /// What single numbers say: which single causes and which pairs of constants reach them.
 ///
 /// # Errors
 /// If the nominal model cannot be simulated, in words.
-pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<Diagnosis, String> {
+pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<Found, String> {
     let signals = dataset.observations.iter().enumerate().map(|(index, o)| Signal {
         id: format!("{}-{}", index + 1, o.measure),
         values: vec![o.value],
@@ -230,37 +269,47 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
     let fine = nominal.chi2 <= EXPLAINED * count;
     let name =
         |fit: &Fit| fit.model.terms.iter().map(|term| plant.candidates[term.candidate].id).collect::<Vec<_>>().join(" with ");
+    let form = |fit: &Fit| match &fit.model.terms[..] {
+        [term] => {
+            let c = &plant.candidates[term.candidate];
+            names::form(c.id, &c.fixed, c.parameters.iter().map(|p| p.name))
+        }
+        _ => String::new(),
+    };
+    let words = |fit: &Fit| {
+        let causes = fit.model.terms.iter().map(|term| names::cause(plant.candidates[term.candidate].id));
+        names::with_form(&causes.collect::<Vec<_>>().join(" with "), &form(fit))
+    };
+    let adopted = |fit: &Fit| {
+        let terms = fit.model.terms.iter().enumerate();
+        terms
+            .map(|(index, term)| {
+                let c = &plant.candidates[term.candidate];
+                let spread = 1.96 * super::search::covariance(&fit.information)[(index, index)].sqrt();
+                let free = &c.parameters[0];
+                let ends = [term.x[0] - spread, term.x[0] + spread].map(|x| free.value(x.clamp(free.bounds[0], free.bounds[1])));
+                Adopted {
+                    id: c.id.into(),
+                    kind: c.kind.into(),
+                    cause: c.cause.into(),
+                    parameters: vec![Estimate {
+                        name: free.name.into(),
+                        value: free.value(term.x[0]),
+                        unit: free.unit.into(),
+                        ci95: [Some(ends[0].min(ends[1])), Some(ends[0].max(ends[1]))]
+                            .map(|end| end.filter(|x: &f64| x.is_finite())),
+                        at_bound: term.x[0] <= free.bounds[0] || term.x[0] >= free.bounds[1],
+                    }],
+                    tied_with: Vec::new(),
+                    gain_heldout: 0.0,
+                    fixed: c.fixed.iter().map(|(name, value)| ((*name).into(), *value)).collect(),
+                }
+            })
+            .collect::<Vec<_>>()
+    };
     let effects: Vec<Adopted> = if fine {
         Vec::new()
     } else {
-        let adopted = |fit: &Fit| {
-            let terms = fit.model.terms.iter().enumerate();
-            terms
-                .map(|(index, term)| {
-                    let c = &plant.candidates[term.candidate];
-                    let spread = 1.96 * super::search::covariance(&fit.information)[(index, index)].sqrt();
-                    let free = &c.parameters[0];
-                    let ends =
-                        [term.x[0] - spread, term.x[0] + spread].map(|x| free.value(x.clamp(free.bounds[0], free.bounds[1])));
-                    Adopted {
-                        id: c.id.into(),
-                        kind: c.kind.into(),
-                        cause: c.cause.into(),
-                        parameters: vec![Estimate {
-                            name: free.name.into(),
-                            value: free.value(term.x[0]),
-                            unit: free.unit.into(),
-                            ci95: [Some(ends[0].min(ends[1])), Some(ends[0].max(ends[1]))]
-                                .map(|end| end.filter(|x: &f64| x.is_finite())),
-                            at_bound: term.x[0] <= free.bounds[0] || term.x[0] >= free.bounds[1],
-                        }],
-                        tied_with: Vec::new(),
-                        gain_heldout: 0.0,
-                        fixed: c.fixed.iter().map(|(name, value)| ((*name).into(), *value)).collect(),
-                    }
-                })
-                .collect::<Vec<_>>()
-        };
         let others: Vec<String> = explained.iter().skip(1).map(&name).collect();
         let mut first = explained.first().map(adopted).unwrap_or_default();
         first.iter_mut().for_each(|effect| effect.tied_with.clone_from(&others));
@@ -289,7 +338,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
             parameters: Vec::new(),
         })
     };
-    let list = explained.iter().map(&name).collect::<Vec<_>>().join("; ");
+    let list = explained.iter().map(&words).collect::<Vec<_>>().join("; ");
     let summary = match verdict {
         Verdict::None => "The nominal model reaches all numbers within two standard deviations.".to_owned(),
         Verdict::Unexplained => "No single cause and no two constants of the nominal model reach all numbers.".to_owned(),
@@ -300,7 +349,23 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
     let mut ranked: Vec<&Fit> = fits.iter().collect();
     ranked.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     let best = explained.first().filter(|_| !fine).unwrap_or(&nominal);
-    Ok(Diagnosis {
+    let predicted = |fit: &Fit| -> Result<Vec<f64>, String> {
+        let residuals = bench.residuals_of(&fit.model, &runs)?;
+        Ok(dataset.observations.iter().zip(&residuals).map(|(o, r)| o.value - r[0] * o.sigma).collect())
+    };
+    let (of_nominal, of_best) = (predicted(&nominal)?, predicted(best)?);
+    let numbers = dataset.observations.iter().zip(of_nominal.into_iter().zip(of_best)).map(|(o, (nominal, best))| Number {
+        measure: o.measure.clone(),
+        setting: setting(o),
+        value: o.value,
+        sigma: o.sigma,
+        nominal,
+        best,
+    });
+    let reaching: &[Fit] = if fine { &[] } else { &explained };
+    let ways = reaching.iter().map(|fit| Way { effects: adopted(fit), misfit: (fit.chi2 / count).sqrt() }).collect();
+    let numbers = numbers.collect();
+    let diagnosis = Diagnosis {
         schema: 1,
         dataset: dataset.name.clone(),
         verdict,
@@ -314,7 +379,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
         extended: stage(best)?,
         candidates: ranked
             .into_iter()
-            .map(|fit| Ranked { id: name(fit), rmse_heldout_mm: (fit.chi2 / count).sqrt(), delta_bic: fit.chi2 + count.ln() - nominal.chi2 })
+            .map(|fit| Ranked { id: name(fit), form: form(fit), rmse_heldout_mm: (fit.chi2 / count).sqrt(), delta_bic: fit.chi2 + count.ln() - nominal.chi2 })
             .collect(),
         correlations: Vec::new(),
         condition: 1.0,
@@ -325,23 +390,83 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<D
         }),
         data_quality: Vec::new(),
         remarks: vec!["candidates are ranked by their misfit in standard deviations; there is no held-out number".into()],
-    })
+    };
+    Ok(Found { diagnosis, numbers, ways })
 }
 
-/// A short page: the summary and every number.
-pub fn page(d: &Diagnosis) -> String {
-    let mut out = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Diagnosis of {0}</title></head><body><h1>Diagnosis of {0}</h1><p>{1}</p>\
-         <table><tr><th>number</th><th>nominal (standard deviations)</th><th>best</th></tr>",
-        escape(&d.dataset),
-        escape(&d.summary)
+/// The page, in the style of the [`report`]: the verdict, every number, what would reach them.
+pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
+    let Found { diagnosis: d, numbers, ways } = found;
+    let mut out = report::heading(d);
+    out.push_str(
+        "<p class=\"small\">Single numbers cannot be split into some to fit and some to judge by: they rule causes out, and say what ties them, but name \
+         none.</p>\n<h2>The numbers</h2>\n",
     );
-    for (a, b) in d.baseline.runs.iter().zip(&d.extended.runs) {
-        out += &format!("<tr><td>{}</td><td>{:.2}</td><td>{:.2}</td></tr>", escape(&a.id), a.rmse_noises, b.rmse_noises);
+    let columns =
+        ["number", "under", "#measured", "#± one standard deviation", "#nominal model", "#off by (standard deviations)"];
+    let mut table = Table::new(&[&columns[..], &["#with the best below", "#off by (standard deviations)"]].concat());
+    for number in numbers {
+        let digits = digits_for(number.sigma);
+        let off = |predicted: f64| (number.value - predicted) / number.sigma;
+        let cell = |predicted: f64| Cell::from(signed(-off(predicted), 1)).bad_if(off(predicted).abs() > EXPLAINED.sqrt());
+        table.row([
+            label_of(&number.measure).into(),
+            number.setting.as_str().into(),
+            fixed(number.value, digits).into(),
+            fixed(number.sigma, digits).into(),
+            fixed(number.nominal, digits).into(),
+            cell(number.nominal),
+            fixed(number.best, digits).into(),
+            cell(number.best),
+        ]);
     }
-    out += "</table><table><tr><th>cause</th><th>misfit (standard deviations, rms)</th></tr>";
+    out.push_str(&table.html());
+    out.push_str("<h2>What would reach them</h2>\n");
+    if ways.is_empty() {
+        out.push_str(match d.verdict {
+            Verdict::None => "<p>Nothing has to be added: the nominal model does.</p>\n",
+            _ => "<p>No single cause, and no two constants.</p>\n",
+        });
+    } else {
+        let constants = names::constants(&dataset.robot);
+        let mut table = Table::new(&[
+            "cause, form",
+            "constant",
+            "#value",
+            "#95 % range",
+            "unit",
+            "remark",
+            "#misfit (standard deviations, rms)",
+        ]);
+        for way in ways {
+            for effect in &way.effects {
+                for estimate in &effect.parameters {
+                    let shown = names::shown(&effect.id, estimate, &constants);
+                    table.row([
+                        names::with_form(&effect.id, &names::form_of(effect)).into(),
+                        shown.name.into(),
+                        shown.value.into(),
+                        shown.range.into(),
+                        shown.unit.into(),
+                        Cell::from(shown.note).bad_if(estimate.at_bound),
+                        fixed(way.misfit, 2).into(),
+                    ]);
+                }
+            }
+        }
+        out.push_str(&table.html());
+        let two = if ways.iter().any(|way| way.effects.len() > 1) { " Two rows of one misfit belong together." } else { "" };
+        out += &format!("<p class=\"small\">Each of them does it alone; the numbers cannot tell which it is.{two}</p>\n");
+    }
+    out.push_str("<h2>All causes tried, one at a time</h2>\n");
+    let mut table = Table::new(&["cause, form", "#misfit (standard deviations, rms)"]);
     for c in &d.candidates {
-        out += &format!("<tr><td>{}</td><td>{:.2}</td></tr>", c.id, c.rmse_heldout_mm);
+        table.row([names::with_form(&c.id, &c.form).into(), fixed(c.rmse_heldout_mm, 2).into()]);
     }
-    out + &format!("</table><p>{}</p></body></html>\n", escape(d.next_experiment.as_deref().unwrap_or("")))
+    out.push_str(&table.html());
+    if let Some(next) = &d.next_experiment {
+        out += &format!("<h2>What to measure next</h2>\n<p>To tell them apart: {}.</p>\n", report::prose(next));
+    }
+    out += &format!("<h2>How to reproduce</h2>\n<p><code>{}</code></p>\n", escape(command));
+    document(&format!("Diagnosis of {}", d.dataset), &out)
 }

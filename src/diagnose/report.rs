@@ -2,60 +2,75 @@
 
 use std::fmt::Write;
 
-use super::diagnosis::{Diagnosis, Estimate, Stage, Verdict};
+use super::diagnosis::{Diagnosis, Stage, Verdict, failing};
 use super::fit::Residuals;
+use super::names;
+use super::picture;
 use super::plant::{Plant, Signal};
 use super::verdict::Outcome;
-use crate::view::{Figure, Mark, escape};
+use crate::model::Robot;
+use crate::view::page::{Cell, Table, document, figure};
+use crate::view::{Figure, Mark, digits_for, escape, fixed, minus, signed, significant};
 
-const STYLE: &str = "body{font:15px/1.5 Helvetica,Arial,sans-serif;color:#111;max-width:1020px;margin:0 auto;padding:18px}\
-h1{font-size:21px}h2{font-size:17px;margin:34px 0 6px}.verdict{font-size:19px;border-left:6px solid #0072b2;padding:8px 14px;background:#f3f7fa}\
-table{border-collapse:collapse;font-size:13.5px;margin:8px 0;min-width:60%}th,td{text-align:left;padding:4px 14px 4px 0;border-bottom:1px solid #ddd;\
-vertical-align:top}th{border-bottom:2px solid #111}td.n{text-align:right;font-variant-numeric:tabular-nums}figure{margin:10px 0;display:inline-block;\
-width:49%;min-width:420px}figure svg{width:100%}figcaption,.small{color:#444;font-size:13px}.bad{color:#b33c00}code,pre{background:#f4f4f4;\
-font-size:13px}pre{padding:10px;overflow:auto}";
 /// Runs that are drawn, and rows of each at most.
 const RUNS: usize = 3;
 const ROWS: usize = 700;
 /// Candidates that are listed.
 const CANDIDATES: usize = 12;
+/// Residuals of a run that are larger than the noise by more than this are marked.
+const LARGE: f64 = 1.2;
 
 /// What a report needs beside the outcome.
 pub struct Context<'a> {
     /// The plant.
     pub plant: &'a dyn Plant,
+    /// The nominal robot, whose constants are named.
+    pub robot: &'a Robot,
     /// The command that makes it again.
     pub command: &'a str,
     /// The extended experiment, as text.
     pub extended: &'a str,
 }
 
+/// A text of the diagnosis as it stands on a page.
+pub(super) fn prose(text: &str) -> String {
+    escape(&minus(text))
+}
+
+/// Title and verdict, which every page of a diagnosis begins with.
+pub(super) fn heading(d: &Diagnosis) -> String {
+    let fails = failing(&d.extended.residual_tests).is_some();
+    let verdict = match (d.verdict, fails) {
+        (Verdict::None, false) => "Nothing missing",
+        (Verdict::None, true) => "Nothing named, but tests fail",
+        (Verdict::Named, false) => "Named",
+        (Verdict::Named, true) => "Named, but tests fail",
+        (Verdict::Tied, false) => "Tied",
+        (Verdict::Tied, true) => "Tied, and tests fail",
+        (Verdict::Unexplained, _) => "Unexplained",
+    };
+    format!(
+        "<h1>Diagnosis of {}</h1>\n<p class=\"verdict\"><strong>{verdict}.</strong> {}</p>\n",
+        escape(&d.dataset),
+        prose(&d.summary)
+    )
+}
+
 /// The page.
 pub fn page(outcome: &Outcome, context: &Context) -> String {
     let d = &outcome.diagnosis;
     let unit = context.plant.unit();
-    let mut out = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Diagnosis of {0}</title><style>{STYLE}</style></head><body>\n\
-         <h1>Diagnosis of {0}</h1>\n<p class=\"verdict\"><strong>{1}.</strong> {2}</p>\n",
-        escape(&d.dataset),
-        match d.verdict {
-            Verdict::None => "Nothing missing",
-            Verdict::Named => "Named",
-            Verdict::Tied => "Tied",
-            Verdict::Unexplained => "Unexplained",
-        },
-        escape(&d.summary)
-    );
+    let mut out = heading(d);
     let _ = writeln!(
         out,
-        "<p class=\"small\">Noise {:.3} {unit}; of the misfit above it {:.1} % is left. Models were fitted to {} runs and judged on {} others.</p>",
-        d.noise_mm,
-        100.0 * d.unexplained_fraction,
+        "<p class=\"small\">Noise {} {unit}; of the misfit above it {} % is left. Models were fitted to {} runs and judged on {} others.</p>",
+        significant(d.noise_mm, 3),
+        fixed(100.0 * d.unexplained_fraction, 1),
         outcome.split.fit.len(),
         outcome.split.held.len()
     );
     for line in &d.unexplained {
-        let _ = writeln!(out, "<p class=\"bad\">What is left: {}</p>", escape(line));
+        let _ = writeln!(out, "<p class=\"bad\">What is left: {}</p>", prose(line));
     }
     gain(&mut out, d, unit);
     let mut order = outcome.split.all();
@@ -67,7 +82,7 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
         let signal = &context.plant.signals()[*run];
         let channel = loudest(signal, &outcome.nominal.residuals[*run]);
         let name = context.plant.channels().get(channel).cloned().unwrap_or_default();
-        motion(&mut out, outcome, *run, signal, channel, &format!("{name} ({unit})"), index);
+        motion(&mut out, outcome, *run, signal, channel, &format!("{} ({unit})", name.replace('_', " ")), index);
     }
     out.push_str("<h2>Residuals, before and after</h2>\n");
     for (index, run) in order.iter().enumerate() {
@@ -76,59 +91,59 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
         residuals(&mut out, outcome, *run, signal, channel, index);
     }
     ranking(&mut out, d, unit);
-    parameters(&mut out, d);
+    parameters(&mut out, outcome, context);
     tests(&mut out, d);
     out.push_str("<h2>Data quality</h2>\n");
     list(&mut out, &d.data_quality, "Nothing was noticed.");
-    list(&mut out, &d.remarks, "");
+    if !d.remarks.is_empty() {
+        out.push_str("<h3>Remarks on the analysis</h3>\n");
+        list(&mut out, &d.remarks, "");
+    }
     out.push_str("<h2>What to measure next</h2>\n");
     let next = d.next_experiment.as_deref().unwrap_or(match d.verdict {
         Verdict::Unexplained => "Repeat the worst runs first: what does not repeat is not the robot's.",
         _ => "Nothing is tied: a run at an amplitude and a frequency that no run has yet would test the extended model best.",
     });
-    let _ = writeln!(out, "<p>{}</p>", escape(next));
+    let _ = writeln!(out, "<p>{}</p>", prose(next));
     let _ = write!(
         out,
         "<h2>How to reproduce</h2>\n<p><code>{}</code></p><p>The extended model, <code>extended.toml</code>; run it with \
-         <code>sfers run extended.toml</code>:</p><pre>{}</pre>\n</body></html>\n",
+         <code>sfers run extended.toml</code>:</p><pre>{}</pre>\n",
         escape(context.command),
         escape(context.extended)
     );
-    out
+    document(&format!("Diagnosis of {}", d.dataset), &out)
 }
 
 fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
-    let _ = writeln!(
-        out,
-        "<h2>The gain, on runs that no fit saw</h2>\n<table><tr><th>model</th><th>held-out error ({unit})</th><th>range</th><th>all runs ({unit})</th></tr>"
-    );
+    let digits = digits_for(d.noise_mm.max(1e-5)) + 1;
+    out.push_str("<h2>The gain, on runs that no fit saw</h2>\n");
+    let error = format!("#held-out error ({unit})");
+    let mut table = Table::new(&["model", &error, "#95 % range", &format!("#all runs ({unit})")]);
     for (name, stage) in [("nominal", &d.baseline), ("re-tuned constants", &d.calibrated), ("extended", &d.extended)] {
         let [low, high] = stage.rmse_heldout_ci95_mm;
-        let _ = writeln!(
-            out,
-            "<tr><td>{name}</td><td class=\"n\">{:.4}</td><td class=\"n\">{low:.4} to {high:.4}</td><td class=\"n\">{:.4}</td></tr>",
-            stage.rmse_heldout_mm, stage.rmse_mm
-        );
+        table.row([
+            name.into(),
+            fixed(stage.rmse_heldout_mm, digits).into(),
+            format!("{} to {}", fixed(low, digits), fixed(high, digits)).into(),
+            fixed(stage.rmse_mm, digits).into(),
+        ]);
     }
-    out.push_str("</table>\n");
-    let _ = writeln!(
-        out,
-        "<table><tr><th>run</th><th>role</th><th>nominal ({unit})</th><th>re-tuned</th><th>extended</th><th>in noises</th></tr>"
-    );
+    out.push_str(&table.html());
+    let columns = ["nominal", "re-tuned", "extended"].map(|model| format!("#{model} ({unit})"));
+    let [nominal, tuned, extended] = columns.each_ref().map(String::as_str);
+    let mut table = Table::new(&["run", "role", nominal, tuned, extended, "#extended / noise"]);
     for ((nominal, tuned), extended) in d.baseline.runs.iter().zip(&d.calibrated.runs).zip(&d.extended.runs) {
-        let class = if extended.rmse_noises > 1.2 { " bad" } else { "" };
-        let _ = writeln!(
-            out,
-            "<tr><td>{}</td><td>{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{:.4}</td><td class=\"n\">{:.4}</td><td class=\"n{class}\">{:.2}</td></tr>",
-            escape(&nominal.id),
-            nominal.role,
-            nominal.rmse_mm,
-            tuned.rmse_mm,
-            extended.rmse_mm,
-            extended.rmse_noises
-        );
+        table.row([
+            nominal.id.as_str().into(),
+            nominal.role.into(),
+            fixed(nominal.rmse_mm, digits).into(),
+            fixed(tuned.rmse_mm, digits).into(),
+            fixed(extended.rmse_mm, digits).into(),
+            Cell::from(fixed(extended.rmse_noises, 2)).bad_if(extended.rmse_noises > LARGE),
+        ]);
     }
-    out.push_str("</table>\n");
+    out.push_str(&table.html());
 }
 
 /// The channel with the largest residual.
@@ -147,125 +162,166 @@ fn rows(signal: &Signal, channel: usize) -> Vec<usize> {
     rows.into_iter().step_by(every).collect()
 }
 
-fn figure(out: &mut String, name: &str, figure: &Figure) {
-    // Every figure names its clipping box alike; on one page the names must differ.
-    let svg = figure.svg().replace("\"box\"", &format!("\"box-{name}\"")).replace("#box", &format!("#box-{name}"));
-    let _ = writeln!(out, "<figure>{svg}</figure>");
-}
-
 fn motion(out: &mut String, outcome: &Outcome, run: usize, signal: &Signal, channel: usize, label: &str, index: usize) {
     let rows = rows(signal, channel);
+    out.push_str("<div class=\"pair\">\n");
     for (kind, residuals) in [("nominal", &outcome.nominal.residuals[run]), ("extended", &outcome.extended.residuals[run])] {
         let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", label);
         let used = |i: &&usize| outcome.used[run][**i];
         f.series("measured", rows.iter().filter(used).map(|i| (signal.times[*i], signal.values[*i])), Mark::Line);
         let simulated =
             rows.iter().filter(used).map(|i| (signal.times[*i], signal.values[*i] - residuals[*i] * signal.sigmas[*i]));
-        f.series(kind, simulated, Mark::Line);
-        figure(out, &format!("motion-{kind}-{index}"), &f);
+        f.series(&format!("{kind} model"), simulated, Mark::Line);
+        out.push_str(&figure(&format!("motion-{kind}-{index}"), "", &f.svg(), ""));
     }
+    out.push_str("</div>\n");
 }
 
 fn residuals(out: &mut String, outcome: &Outcome, run: usize, signal: &Signal, channel: usize, index: usize) {
     let rows = rows(signal, channel);
+    out.push_str("<div class=\"pair\">\n");
     for (kind, residuals) in [("re-tuned", &outcome.calibrated.residuals[run]), ("extended", &outcome.extended.residuals[run])] {
-        let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", "residual (noises)");
+        let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", "residual / noise");
         f.horizontal(0.0);
         let used = rows.iter().filter(|i| outcome.used[run][**i]);
         f.series("", used.map(|i| (signal.times[*i], residuals[*i])), Mark::Line);
-        figure(out, &format!("residual-{kind}-{index}"), &f);
+        out.push_str(&figure(&format!("residual-{kind}-{index}"), "", &f.svg(), ""));
     }
+    out.push_str("</div>\n");
 }
 
 fn ranking(out: &mut String, d: &Diagnosis, unit: &str) {
+    out.push_str("<h2>Candidates, on top of re-tuned constants</h2>\n");
+    if d.candidates.is_empty() {
+        out.push_str("<p>None was tried.</p>\n");
+        return;
+    }
+    let mut table = Table::new(&["cause, form", &format!("#held-out error ({unit})"), "#change of BIC"]);
+    for c in d.candidates.iter().take(CANDIDATES) {
+        table.row([names::with_form(&c.id, &c.form).into(), fixed(c.rmse_heldout_mm, 4).into(), signed(c.delta_bic, 0).into()]);
+    }
+    out.push_str(&table.html());
+    out.push_str(
+        "<p class=\"small\">Those that a linear estimate puts first; the others would do less. A lower BIC (Bayes's information criterion) is \
+         better. Forms of one cause exclude one another.</p>\n",
+    );
+}
+
+fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
+    let d = &outcome.diagnosis;
+    let constants = names::constants(context.robot);
+    out.push_str("<h2>Parameters</h2>\n");
+    let columns = ["#value", "#95 % range", "unit", "remark"];
+    if d.effects.is_empty() {
+        out.push_str("<p>Nothing was added to the nominal model.</p>\n");
+    } else {
+        let mut table = Table::new(&["cause, form", "constant", columns[0], columns[1], columns[2], columns[3]]);
+        for effect in &d.effects {
+            for estimate in &effect.parameters {
+                let shown = names::shown(&effect.id, estimate, &constants);
+                let cause = names::with_form(&effect.id, &names::form_of(effect));
+                let note = Cell::from(shown.note).bad_if(estimate.at_bound);
+                table.row([cause.into(), shown.name.into(), shown.value.into(), shown.range.into(), shown.unit.into(), note]);
+            }
+        }
+        out.push_str(&table.html());
+    }
+    for effect in &d.effects {
+        let others: Vec<String> = effect.tied_with.iter().map(|id| names::cause(id)).collect();
+        let tied = if others.is_empty() { String::new() } else { format!(" Tied with {}.", others.join(", ")) };
+        let _ = writeln!(
+            out,
+            "<p class=\"small\"><strong>{}</strong> ({}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
+             noise.{tied}</p>",
+            escape(&names::cause(&effect.id)),
+            effect.kind,
+            effect.id,
+            prose(&effect.cause),
+            fixed(100.0 * effect.gain_heldout, 1)
+        );
+    }
+    out.push_str("<h3>Constants of the nominal model, re-tuned alone</h3>\n");
+    // The estimates stand in the order of the model's terms.
+    let terms = &outcome.calibrated.model().terms;
+    let ids = terms.iter().flat_map(|term| {
+        let candidate = &context.plant.candidates()[term.candidate];
+        candidate.parameters.iter().map(|_| candidate.id)
+    });
+    let mut table = Table::new(&["constant", columns[0], columns[1], columns[2], columns[3]]);
+    for (id, estimate) in ids.zip(&d.calibrated.parameters) {
+        let shown = names::shown(id, estimate, &constants);
+        let name = if shown.name == names::cause(id) { shown.name } else { format!("{}, {}", names::cause(id), shown.name) };
+        let note = Cell::from(shown.note).bad_if(estimate.at_bound);
+        table.row([name.into(), shown.value.into(), shown.range.into(), shown.unit.into(), note]);
+    }
+    if d.calibrated.parameters.is_empty() {
+        out.push_str("<p>None had to be.</p>\n");
+    } else {
+        out.push_str(&table.html());
+    }
+    for c in &d.correlations {
+        let words = |name: &String| {
+            name.split_once(' ').map_or_else(
+                || name.clone(),
+                |(id, name)| {
+                    let (cause, number) = (names::cause(id), names::parameter(id, name));
+                    if cause == number { cause } else { format!("{cause}: {number}") }
+                },
+            )
+        };
+        let [a, b] = c.between.each_ref().map(words);
+        let _ = writeln!(
+            out,
+            "<p class=\"bad\">{} and {} are correlated by {}: the data hardly tell them apart.</p>",
+            escape(&a),
+            escape(&b),
+            fixed(c.coefficient, 3)
+        );
+    }
     let _ = writeln!(
         out,
-        "<h2>Candidates, on top of re-tuned constants</h2>\n<table><tr><th>cause</th><th>held-out error ({unit})</th><th>change of BIC</th></tr>"
+        "<p class=\"small\">Condition of the fit, the ratio of the largest to the smallest eigenvalue of its scaled information: {}.</p>",
+        significant(d.condition, 2)
     );
-    for c in d.candidates.iter().take(CANDIDATES) {
-        let _ = writeln!(
-            out,
-            "<tr><td>{}</td><td class=\"n\">{:.4}</td><td class=\"n\">{:.0}</td></tr>",
-            c.id, c.rmse_heldout_mm, c.delta_bic
-        );
-    }
-    out.push_str("</table>\n<p class=\"small\">Those that a linear estimate puts first; the others would do less.</p>\n");
-}
-
-fn estimate(e: &Estimate) -> String {
-    let end = |end: Option<f64>| end.map_or_else(|| "open".into(), |v| format!("{v:.5}"));
-    format!(
-        "<td>{}</td><td class=\"n\">{:.5}</td><td class=\"n\">{} to {}</td><td>{}</td><td>{}</td>",
-        e.name,
-        e.value,
-        end(e.ci95[0]),
-        end(e.ci95[1]),
-        escape(&e.unit),
-        if e.at_bound { "at the end of its range" } else { "" }
-    )
-}
-
-fn parameters(out: &mut String, d: &Diagnosis) {
-    out.push_str("<h2>Parameters</h2>\n<table><tr><th>cause</th><th>parameter</th><th>value</th><th>95 % range</th><th>unit</th><th></th></tr>\n");
-    for effect in &d.effects {
-        for e in &effect.parameters {
-            let _ = writeln!(out, "<tr><td>{}</td>{}</tr>", effect.id, estimate(e));
-        }
-    }
-    out.push_str("</table>\n");
-    for effect in &d.effects {
-        let tied =
-            if effect.tied_with.is_empty() { String::new() } else { format!(" Tied with {}.", effect.tied_with.join(", ")) };
-        let _ = writeln!(
-            out,
-            "<p class=\"small\"><strong>{}</strong> ({}): {} It removes {:.1} % of the held-out error above the noise.{tied}</p>",
-            effect.id,
-            effect.kind,
-            escape(&effect.cause),
-            100.0 * effect.gain_heldout
-        );
-    }
-    out.push_str("<p class=\"small\">Constants of the nominal model, re-tuned alone:</p><table>\n");
-    for e in &d.calibrated.parameters {
-        let _ = writeln!(out, "<tr>{}</tr>", estimate(e));
-    }
-    out.push_str("</table>\n");
-    for c in &d.correlations {
-        let _ =
-            writeln!(out, "<p class=\"bad\">{} and {} are correlated by {:.3}.</p>", c.between[0], c.between[1], c.coefficient);
-    }
-    let _ = writeln!(out, "<p class=\"small\">Condition of the fit: {:.1e}.</p>", d.condition);
 }
 
 fn tests(out: &mut String, d: &Diagnosis) {
     out.push_str("<h2>Tests of the residuals</h2>\n");
     let failed = |stage: &Stage| stage.residual_tests.iter().filter(|test| !test.passed).count();
+    let all = d.baseline.residual_tests.len();
+    if all == 0 {
+        out.push_str("<p>There are too few values for any.</p>\n");
+        return;
+    }
     let _ = writeln!(
         out,
-        "<p>{} of {} fail for the nominal model, {} with re-tuned constants, {} for the extended one.</p>",
+        "<p>{} of {all} fail for the nominal model, {} with re-tuned constants, {} for the extended one; noise alone would fail about {}.</p>",
         failed(&d.baseline),
-        d.baseline.residual_tests.len(),
         failed(&d.calibrated),
-        failed(&d.extended)
+        failed(&d.extended),
+        significant(1e-3 * all as f64, 1)
     );
-    out.push_str("<table><tr><th>run</th><th>test</th><th>nominal</th><th>re-tuned</th><th>extended</th><th>limit</th><th>what it means, before and after</th></tr>\n");
+    let models = [("nominal", &d.baseline), ("re-tuned", &d.calibrated), ("extended", &d.extended)];
+    let picture = picture::residual_tests(&models.map(|(name, stage)| (name, stage.residual_tests.as_slice())));
+    let caption = "A row for each run, a column for each test; crossed where the residuals are not noise. Size: chi-square per value. Neighbours, input, \
+                   input's rate: correlation with them. The others are named in full below.";
+    out.push_str(&figure("tests", "wide", &picture, caption));
+    let mut table =
+        Table::new(&["run", "test", "#nominal", "#re-tuned", "#extended", "#limit", "what it means, before and after"]);
     for ((a, b), c) in d.baseline.residual_tests.iter().zip(&d.calibrated.residual_tests).zip(&d.extended.residual_tests) {
-        let cell =
-            |passed: bool, statistic: f64| format!("<td class=\"n{}\">{statistic:.3}</td>", if passed { "" } else { " bad" });
-        let _ = writeln!(
-            out,
-            "<tr><td>{}</td><td>{}</td>{}{}{}<td class=\"n\">{:.3}</td><td>{}; {}</td></tr>",
-            escape(&a.run),
-            a.name,
-            cell(a.passed, a.statistic),
-            cell(b.passed, b.statistic),
-            cell(c.passed, c.statistic),
-            a.limit,
-            a.meaning,
-            c.meaning
-        );
+        let cell = |test: &super::tests::ResidualTest| Cell::from(fixed(test.statistic, 3)).bad_if(!test.passed);
+        let meaning = if a.meaning == c.meaning { a.meaning.clone() } else { format!("{}; then {}", a.meaning, c.meaning) };
+        table.row([
+            a.run.as_str().into(),
+            a.name.as_str().into(),
+            cell(a),
+            cell(b),
+            cell(c),
+            fixed(a.limit, 3).into(),
+            meaning.into(),
+        ]);
     }
-    out.push_str("</table>\n");
+    let _ = writeln!(out, "<details><summary>All statistics</summary>\n{}</details>", table.html());
 }
 
 fn list(out: &mut String, lines: &[String], none: &str) {
@@ -275,7 +331,7 @@ fn list(out: &mut String, lines: &[String], none: &str) {
     }
     out.push_str("<ul>");
     for line in lines {
-        let _ = write!(out, "<li>{}</li>", escape(line));
+        let _ = write!(out, "<li>{}</li>", prose(line));
     }
     out.push_str("</ul>\n");
 }

@@ -1,9 +1,10 @@
 //! The whole loop, from a plant to a [`Diagnosis`].
 
 use super::dataset::Role;
-use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict, summary};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict, failing, summary};
 use super::fit::{BLOCK, Bench, Residuals};
 use super::intervals::{Intervals, intervals_of, numerics};
+use super::names;
 use super::plant::{Model, Plant, Term};
 use super::search::{Scored, Search, Split, Trial, split};
 use super::tests::residual_tests;
@@ -140,24 +141,39 @@ pub fn diagnose(
         let terms = scored.model().terms.iter().enumerate();
         terms.flat_map(|(index, term)| estimates(&search, index, term, found)).collect()
     };
+    let form = |candidate: usize| {
+        let candidate = &plant.candidates()[candidate];
+        names::form(candidate.id, &candidate.fixed, candidate.parameters.iter().map(|p| p.name))
+    };
     let ranked = |trial: &Trial| Ranked {
         id: search.id(trial.candidate).to_owned(),
+        form: form(trial.candidate),
         rmse_heldout_mm: rmse(plant, &search.bench.used, &trial.scored.residuals, &search.split.held),
         delta_bic: trial.scored.bic() - calibrated.bic(),
     };
     let sigmas: Vec<f64> = plant.signals().iter().flat_map(|signal| signal.sigmas.iter().copied()).collect();
+    let extended = stage(&best, parameters(&best, &intervals));
+    let failed = failing(&extended.residual_tests);
     let diagnosis = Diagnosis {
         schema: 1,
         dataset: name.to_owned(),
         verdict,
-        summary: summary(verdict, &effects, unexplained_fraction, poor.as_deref(), best.model().resolution, refined),
+        summary: summary(
+            verdict,
+            &effects,
+            unexplained_fraction,
+            poor.as_deref(),
+            best.model().resolution,
+            refined,
+            failed.as_deref(),
+        ),
         // Where what is left is no more than noise, its share of a small misfit says nothing: it is given as a share of the noise then.
         unexplained_fraction: if is_unexplained { unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
         unexplained,
         noise_mm: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64,
         baseline: stage(&nominal, Vec::new()),
         calibrated: stage(&calibrated, parameters(&calibrated, &constants)),
-        extended: stage(&best, parameters(&best, &intervals)),
+        extended,
         candidates: trials.iter().map(ranked).collect(),
         correlations: intervals.correlations.clone(),
         condition: intervals.condition,
@@ -260,12 +276,12 @@ fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>,
         if switches.len() > 1 && gain > needed {
             continue;
         }
-        let numbers: Vec<String> = estimates(search, index, term, intervals).iter().map(Estimate::words).collect();
+        let numbers: Vec<String> = estimates(search, index, term, intervals).iter().map(|e| names::words(candidate.id, e)).collect();
         let words = format!(
             "the data are insufficient to name a cause: with {} ({}) they would be explained as well as without it, for the range reaches the value at \
              which it does nothing",
-            candidate.id,
-            numbers.join(", ")
+            names::cause(candidate.id),
+            numbers.join("; ")
         );
         if found.as_ref().is_none_or(|(least, ..)| gain < *least) {
             found = Some((gain, index, words));

@@ -55,9 +55,10 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let tip = [(arc_end(DEFLECTION), DEFLECTION)];
     findings.publish(&mut figure, "measured tip, −1000 V", Origin::Measured, &tip, None);
     findings.figure = figure.svg();
-    findings.caption = "Shapes at rest, gravity included, for both published sets of constants. The paper gives the tip's deflection alone; \
+    findings.caption =
+        "Shapes at rest, gravity included, for both published sets of constants. The paper gives the tip's deflection alone; \
                         its x is that of a circular arc. It gives no accuracy."
-        .into();
+            .into();
     Ok(findings)
 }
 
@@ -72,7 +73,8 @@ fn arc_end(deflection: f64) -> f64 {
 
 pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
-    let mut figure = Figure::new("Response of the cantilever to a sinusoid between 0 and −1500 V", "frequency (Hz)", "tip amplitude (mm)");
+    let mut figure =
+        Figure::new("Response of the cantilever to a sinusoid between 0 and −1500 V", "frequency (Hz)", "tip amplitude (mm)");
     let (mut spots, mut highest) = (Vec::new(), 0.0);
     for (name, set) in SETS {
         let id = format!("cantilever-response-{}", name.replace(' ', "-"));
@@ -99,7 +101,13 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
             if (m, name) == (3, "set 2") {
                 for &(f, bullet) in &spots {
                     let planar = response.iter().find(|p| p.0 == f).map_or(f64::NAN, |p| p.1);
-                    findings.compare(&format!("amplitude at {f} Hz, m = 3, {name}"), "", format!("{} mm", fixed(planar, 2)), "", "");
+                    findings.compare(
+                        &format!("amplitude at {f} Hz, m = 3, {name}"),
+                        "",
+                        format!("{} mm", fixed(planar, 2)),
+                        "",
+                        "",
+                    );
                     findings.check_on_bullet("mm", planar, bullet);
                 }
             }

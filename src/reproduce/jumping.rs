@@ -126,7 +126,11 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
     let lowest = |i: usize| (0..recording.nodes()).map(|n| recording.node(i, n)[2]).fold(f64::INFINITY, f64::min);
     figure.series("planar engine, midpoint", node(recording.nodes() / 2), Mark::Line);
     figure.series("planar engine, left end", node(0), Mark::Line);
-    figure.series("planar engine, lowest point", (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * lowest(i))), Mark::Line);
+    figure.series(
+        "planar engine, lowest point",
+        (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * lowest(i))),
+        Mark::Line,
+    );
     let volts = |i: usize| recording.motor_voltages[i * recording.joints() + recording.joints() / 2];
     figure.series(
         "drive (−3: on, −4: off)",
@@ -230,7 +234,8 @@ pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
     figure.series("Bullet", bullet, Mark::Points);
     findings.publish(&mut figure, "measured at 14 Hz: 7.5 to about 8 mm", Origin::Measured, &MEASURED.map(|z| (14.0, z)), None);
     findings.figure = figure.svg();
-    findings.caption = "Largest height of the lowest point in 1.2 s. The paper says at least 7.5 mm and as high as about 8 mm.".into();
+    findings.caption =
+        "Largest height of the lowest point in 1.2 s. The paper says at least 7.5 mm and as high as about 8 mm.".into();
     Ok(findings)
 }
 

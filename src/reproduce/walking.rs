@@ -118,7 +118,9 @@ pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
         let published = SPEEDS.iter().find(|(at, _)| *at == f).map(|(_, speed)| *speed);
         let difference = published.map(|speed| format!("{} mm/s", signed(ours - speed, 1))).filter(|_| ours.is_finite());
         let explanation = match published {
-            Some(_) => "Sign and size of the fast speeds follow from friction and from how long contacts last, neither of which the paper specifies.",
+            Some(_) => {
+                "Sign and size of the fast speeds follow from friction and from how long contacts last, neither of which the paper specifies."
+            }
             None => "",
         };
         let published = published.map_or_else(String::new, |speed| format!("{} mm/s (measured)", signed(speed, 0)));
@@ -126,9 +128,13 @@ pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
         findings.check_on_bullet("mm/s", ours, on_bullet);
     }
     findings.without_result(&speeds);
-    let (low, high) = speeds.iter().chain(&bullet).chain(&SPEEDS).map(|p| p.1).fold((0.0, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
-    let mut figure =
-        Figure::new("Speed of the inchworm sequence, (300, 300, −1500, 300, 300) V, friction 0.2 and 4.0", "frequency (Hz)", "speed (mm/s)");
+    let (low, high) =
+        speeds.iter().chain(&bullet).chain(&SPEEDS).map(|p| p.1).fold((0.0, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
+    let mut figure = Figure::new(
+        "Speed of the inchworm sequence, (300, 300, −1500, 300, 300) V, friction 0.2 and 4.0",
+        "frequency (Hz)",
+        "speed (mm/s)",
+    );
     figure.horizontal(0.0);
     figure.series("planar engine", speeds, Mark::Both);
     figure.series("Bullet", bullet, Mark::Points);

@@ -80,7 +80,8 @@ pub fn minus(text: &str) -> String {
     let mut before = ' ';
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
-        let is_sign = c == '-' && !before.is_alphanumeric() && rest.peek().is_some_and(|next| next.is_ascii_digit() || *next == '.');
+        let is_sign =
+            c == '-' && !before.is_alphanumeric() && rest.peek().is_some_and(|next| next.is_ascii_digit() || *next == '.');
         out.push(if is_sign { '−' } else { c });
         before = c;
     }

@@ -53,7 +53,8 @@ impl<T: Into<String>> From<T> for Cell {
 impl Table {
     /// With these columns; `#` before a name sets its numbers right.
     pub fn new(columns: &[&str]) -> Self {
-        let columns = columns.iter().map(|name| name.strip_prefix('#').map_or(((*name).into(), false), |name| (name.into(), true)));
+        let columns =
+            columns.iter().map(|name| name.strip_prefix('#').map_or(((*name).into(), false), |name| (name.into(), true)));
         Self { columns: columns.collect(), stacks: false, rows: String::new() }
     }
 

@@ -1,0 +1,202 @@
+//! What causes, their forms and their numbers are called where people read them. Files keep the ids of [`effects`](crate::effects).
+
+use super::diagnosis::{Adopted, Estimate};
+use crate::model::{Laminate, Robot};
+use crate::view::{digits_for, fixed};
+
+/// A cause in words.
+pub fn cause(id: &str) -> String {
+    match id {
+        "stiffness" => "bending stiffness".into(),
+        "actuation-gain" => "curvature per volt".into(),
+        "damping" => "damping time".into(),
+        "areal-mass" => "mass per area".into(),
+        "discretisation" => "number of joints".into(),
+        "clamp-compliance" => "compliance of the clamp".into(),
+        "stiffness-softening" => "softening of the stiffness".into(),
+        _ => id.replace('-', " "),
+    }
+}
+
+/// Which form of a cause that has several: by what is given of it and what is fitted. Empty for the others.
+pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Iterator<Item = &'a str>) -> String {
+    let given = |name: &str| fixed.iter().find(|(key, _)| key.as_ref() == name).map(|(_, value)| *value);
+    match id {
+        "hysteresis" => match (given("plays"), given("from_zero")) {
+            (Some(plays), _) if plays == 0.0 => "Bouc–Wen".into(),
+            (Some(_), Some(from)) if from == 1.0 => "plays that come from 0 V (Prandtl–Ishlinskii)".into(),
+            (Some(_), _) => "plays at rest at the first voltage (Prandtl–Ishlinskii)".into(),
+            _ => String::new(),
+        },
+        "creep" => match given("rungs_per_decade") {
+            Some(count) if count == 0.0 => "one time constant".into(),
+            Some(count) if count == 1.0 => "one time constant in a decade".into(),
+            Some(count) => format!("{count} time constants in a decade"),
+            None => String::new(),
+        },
+        "saturation" => match fitted.next() {
+            Some("min_v") => "of negative voltages".into(),
+            Some("max_v") => "of positive voltages".into(),
+            _ => String::new(),
+        },
+        "weak-actuator" => given("actuator").map_or_else(String::new, |number| format!("number {number}")),
+        _ => String::new(),
+    }
+}
+
+/// A cause with its form.
+pub fn with_form(id: &str, form: &str) -> String {
+    if form.is_empty() { cause(id) } else { format!("{}, {form}", cause(id)) }
+}
+
+/// The form of an adopted cause.
+pub fn form_of(effect: &Adopted) -> String {
+    form(&effect.id, &effect.fixed, effect.parameters.iter().map(|p| p.name.as_str()))
+}
+
+/// A number of a cause in words, without its unit.
+pub fn parameter(id: &str, name: &str) -> String {
+    match (id, name) {
+        (_, "scale") => cause(id),
+        ("discretisation", "motors_per_actuator") => "joints per actuator".into(),
+        ("clamp-compliance", _) => "turn of the clamp per moment".into(),
+        ("initial-curvature", "curvature_per_m") => "curvature without voltage".into(),
+        ("stiffness-softening", _) => "softening coefficient".into(),
+        ("dry-friction", _) => "moment of friction in every joint".into(),
+        ("tip-mass", "position_mm") => "distance from the left end".into(),
+        ("hysteresis", "width") => "opening of the loop, share of a 1500 V stroke".into(),
+        ("hysteresis", "slope_loss") => "loss of gain at a turning point".into(),
+        ("hysteresis", "shape") => "power of the plays' weights".into(),
+        ("hysteresis", "decay_per_kv") => "decay of the plays' weights".into(),
+        ("hysteresis" | "polarity-asymmetry" | "weak-actuator", "gain" | "ratio") => "gain".into(),
+        ("creep", "per_decade") => "growth in a decade of time".into(),
+        ("creep", "fastest_s") => "fastest time constant".into(),
+        ("creep", "power") => "exponent of the growth".into(),
+        ("passive-margin", _) => "passive share of an actuator".into(),
+        ("field-dependent-gain", "slope_per_kv") => "slope of the gain".into(),
+        ("field-dependent-gain", "curvature_per_kv2") => "curvature of the gain".into(),
+        ("saturation", "min_v") => "least voltage".into(),
+        ("saturation", "max_v") => "largest voltage".into(),
+        ("slew-limit", _) => "largest rate".into(),
+        ("ground-friction", _) => "factor on the friction".into(),
+        ("sensor-scale", _) => "scale of the camera".into(),
+        _ => {
+            let units = ["_per_m", "_mm_s", "_v_per_s", "_mm2", "_mm", "_deg", "_mn_m", "_g", "_s", "_v"];
+            units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name).replace('_', " ")
+        }
+    }
+}
+
+/// A fitted number in words: name, value, range and unit.
+pub fn words(id: &str, p: &Estimate) -> String {
+    let what = if p.name == "scale" { "times the nominal".into() } else { parameter(id, &p.name) };
+    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    match p.ci95 {
+        [Some(low), Some(high)] if low == high => format!("{what} {}", p.value),
+        [Some(low), Some(high)] => {
+            let digits = digits_for(high - low);
+            format!("{what} {:.digits$}{unit}, {low:.digits$} to {high:.digits$}", p.value)
+        }
+        _ => format!("{what} {:.4}{unit}", p.value),
+    }
+}
+
+/// The constants of the nominal model that calibration scales: cause, value, unit.
+pub fn constants(robot: &Robot) -> [(&'static str, f64, &'static str); 4] {
+    let laminate = Laminate::new(&robot.material);
+    [
+        // dyn·cm² to N·mm², 1/(cm·V) to 1/(m·kV), s to ms, g/cm² to kg/m².
+        ("stiffness", 1e-3 * laminate.flexural_rigidity * robot.material.width, "N·mm²"),
+        ("actuation-gain", 1e5 * laminate.curvature_per_volt, "1/(m·kV)"),
+        ("damping", 1e3 * robot.damping.time(), "ms"),
+        ("areal-mass", 10.0 * laminate.areal_density, "kg/m²"),
+    ]
+}
+
+/// A fitted number as it is shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shown {
+    /// What it is.
+    pub name: String,
+    /// Its value, with the digits that its range is worth.
+    pub value: String,
+    /// The range that holds it in 95 % of cases.
+    pub range: String,
+    /// Unit; a dash for plain numbers.
+    pub unit: String,
+    /// What is to be known beside: how far a constant is from its nominal value, whether a value ended at a limit.
+    pub note: String,
+}
+
+/// An estimate of a cause's number; constants of the nominal model in their own units.
+pub fn shown(id: &str, estimate: &Estimate, constants: &[(&str, f64, &str)]) -> Shown {
+    let constant = constants.iter().find(|(of, ..)| *of == id && estimate.name == "scale");
+    let (factor, unit) = constant.map_or((1.0, estimate.unit.as_str()), |(_, nominal, unit)| (*nominal, *unit));
+    let ends = estimate.ci95.map(|end| end.map(|end| factor * end));
+    let is_given = matches!(ends, [Some(low), Some(high)] if low == high);
+    let digits = match ends {
+        _ if estimate.value.fract() == 0.0 && factor == 1.0 && (is_given || id == "discretisation") => 0,
+        [Some(low), Some(high)] if high > low => digits_for(high - low),
+        _ => digits_for(0.01 * factor * estimate.value.abs()),
+    };
+    let end = |end: Option<f64>| end.map_or_else(|| "open".into(), |end| fixed(end, digits));
+    let mut notes = Vec::new();
+    if let Some((_, nominal, _)) = constant {
+        notes.push(format!("{} × the nominal {}", fixed(estimate.value, 3), fixed(*nominal, digits.max(1))));
+    }
+    if estimate.at_bound {
+        notes.push("at the end of what is tried".into());
+    }
+    Shown {
+        name: parameter(id, &estimate.name),
+        value: fixed(factor * estimate.value, digits),
+        range: if is_given { "found by trying".into() } else { format!("{} to {}", end(ends[0]), end(ends[1])) },
+        unit: if unit.is_empty() { "–".into() } else { unit.into() },
+        note: notes.join("; "),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::robot::candidates;
+    use crate::effects::EFFECTS;
+    use crate::experiment::{self, Source, presets};
+
+    fn robot(preset: &str) -> Robot {
+        experiment::experiment(&Source::from_text(preset, presets::find(preset).unwrap().text)).unwrap().robot
+    }
+
+    #[test]
+    fn every_form_of_a_cause_has_a_label_of_its_own() {
+        for preset in ["cantilever-dc", "static-shape"] {
+            let mut labels: Vec<String> = candidates(&robot(preset), 2)
+                .iter()
+                .map(|c| with_form(c.id, &form(c.id, &c.fixed, c.parameters.iter().map(|p| p.name))))
+                .collect();
+            let count = labels.len();
+            labels.sort();
+            labels.dedup();
+            assert_eq!(labels.len(), count, "{labels:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_names_without_underscores_and_constants_have_units() {
+        for effect in EFFECTS {
+            for p in effect.parameters {
+                let name = parameter(effect.id, p.name);
+                assert!(!name.contains('_') && name != "scale" && !name.is_empty(), "{} {}", effect.id, p.name);
+            }
+        }
+        let scale =
+            Estimate { name: "scale".into(), value: 0.5, unit: String::new(), ci95: [Some(0.49), Some(0.52)], at_bound: false };
+        let constants = constants(&robot("cantilever-dc"));
+        for (id, nominal, unit) in constants {
+            let shown = shown(id, &scale, &constants);
+            let value: f64 = shown.value.parse().unwrap();
+            assert!((value / (0.5 * nominal) - 1.0).abs() < 0.05, "{shown:?}");
+            assert!(shown.unit == unit && shown.note.starts_with("0.500 × the nominal"), "{shown:?}");
+        }
+    }
+}
