@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use common::sfers;
+use common::{pages, sfers};
 use serde_json::Value;
 
 fn sample(name: &str) -> PathBuf {
@@ -46,8 +46,7 @@ fn the_sample_with_a_tip_mass_is_named_and_leaves_what_goes_on() {
     assert!((rms / d["extended"]["rmse_mm"].as_f64().unwrap() - 1.0).abs() < 1e-3, "{rms}");
     // One page with its figures, and no reference to anything outside.
     let page = fs::read_to_string(folder.path().join("d/report.html")).unwrap();
-    assert_eq!(page.matches("<svg").count(), 12);
-    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+    assert_eq!(page.matches("<svg").count(), 13);
     let at = |words: &str| page.find(words).unwrap_or_else(|| panic!("{words}"));
     let order = [
         "class=\"verdict\"",
@@ -62,6 +61,62 @@ fn the_sample_with_a_tip_mass_is_named_and_leaves_what_goes_on() {
         "reproduce",
     ];
     assert!(order.windows(2).all(|pair| at(pair[0]) < at(pair[1])));
+    check_report(&page, &d, &text);
+}
+
+/// Parses a report and holds it against its diagnosis.json and extended.toml.
+fn check_report(page: &str, d: &Value, extended: &str) {
+    let document = roxmltree::Document::parse(pages::markup(page)).unwrap();
+    pages::check_self_contained(&document);
+    assert_eq!(pages::wrong_numbers(&document), Vec::<String>::new());
+    assert_eq!(pages::texts(&document, "pre").concat(), extended.trim_end());
+
+    // The first sentence names the tests that fail, if more do than chance explains: three of 80 would in one case of 10,000.
+    let tests = d["extended"]["residual_tests"].as_array().unwrap();
+    let failed: Vec<&str> = tests.iter().filter(|t| t["passed"] == false).map(|t| t["name"].as_str().unwrap()).collect();
+    let verdict = document.descendants().find(|n| pages::has_class(n, "verdict")).map(pages::text).unwrap();
+    let sentence = verdict.split(". ").nth(1).unwrap();
+    if failed.len() >= 3 {
+        assert!(sentence.contains(&format!("{} of {} residual tests still fail", failed.len(), tests.len())), "{verdict}");
+        assert!(failed.iter().all(|name| sentence.contains(name)), "{verdict}");
+    } else if failed.is_empty() {
+        assert!(!verdict.contains("fail"), "{verdict}");
+    }
+
+    // Every test of every model is a square of one picture; those that fail are crossed.
+    let stages = ["baseline", "calibrated", "extended"].map(|stage| d[stage]["residual_tests"].as_array().unwrap());
+    let squares = |class: &str| {
+        document
+            .descendants()
+            .filter(|n| n.has_tag_name(("http://www.w3.org/2000/svg", "g")) && pages::has_class(n, class))
+            .count()
+    };
+    let count = |passed: bool| stages.iter().flat_map(|tests| tests.iter()).filter(|t| t["passed"] == passed).count();
+    assert_eq!((squares("passed"), squares("failed")), (count(true), count(false)));
+
+    // Constants have names and units, no ids.
+    let rows: Vec<Vec<String>> = document
+        .descendants()
+        .filter(|n| n.has_tag_name("tr"))
+        .map(|row| row.children().filter(|n| n.has_tag_name("td")).map(pages::text).collect())
+        .collect();
+    let tuned: Vec<&Vec<String>> = rows.iter().filter(|row| row.len() == 5 && row[4].contains("× the nominal")).collect();
+    assert_eq!(tuned.len(), d["calibrated"]["parameters"].as_array().unwrap().len());
+    let known =
+        [("bending stiffness", "N·mm²"), ("curvature per volt", "1/(m·kV)"), ("damping time", "ms"), ("mass per area", "kg/m²")];
+    assert!(tuned.iter().all(|row| known.contains(&(row[0].as_str(), row[3].as_str()))), "{tuned:?}");
+    assert!(rows.iter().flatten().all(|cell| cell != "scale" && !cell.contains("mass_g")), "{rows:?}");
+    let found: Vec<&Vec<String>> = rows.iter().filter(|row| row.len() == 6 && row[3].contains(" to ")).collect();
+    let fitted: usize = d["effects"].as_array().unwrap().iter().map(|e| e["parameters"].as_array().unwrap().len()).sum();
+    assert_eq!(found.iter().filter(|row| !row[4].is_empty()).count(), fitted, "{rows:?}");
+
+    // Forms of one cause are told apart.
+    let candidates = d["candidates"].as_array().unwrap();
+    let mut labels: Vec<&String> = rows.iter().filter(|row| row.len() == 3).map(|row| &row[0]).collect();
+    assert_eq!(labels.len(), candidates.len().min(12));
+    labels.sort();
+    labels.dedup();
+    assert_eq!(labels.len(), candidates.len().min(12), "{labels:?}");
 }
 
 #[test]
@@ -69,6 +124,13 @@ fn the_samples_with_hysteresis_and_with_nothing_are_told_apart() {
     let folder = tempfile::tempdir().unwrap();
     let d = diagnosed(folder.path(), "sample-hysteresis");
     assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("named"), vec!["hysteresis"]));
+    let read = |name: &str| fs::read_to_string(folder.path().join("d").join(name)).unwrap();
+    check_report(&read("report.html"), &d, &read("extended.toml"));
+    let summary = d["summary"].as_str().unwrap();
+    assert!(
+        summary.starts_with("The simulation lacks: hysteresis, plays") && summary.contains("opening of the loop"),
+        "{summary}"
+    );
     assert!(d["extended"]["rmse_heldout_mm"].as_f64().unwrap() < 1.2 * 0.05);
     let d = diagnosed(folder.path(), "sample-nothing-hidden");
     assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("none"), vec![]));
@@ -93,7 +155,7 @@ fn the_report_opens_in_a_browser_without_a_complaint() {
         .output()
         .unwrap();
     let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(dom.matches("<svg").count() == 12 && dom.contains("Nothing missing"), "{dom}");
+    assert!(dom.matches("<svg").count() == 13 && dom.contains("class=\"verdict\"><strong>Nothing "), "{dom}");
     assert!(!log.contains("CONSOLE"), "{log}");
 }
 
@@ -178,6 +240,18 @@ fn the_published_numbers_are_tied_between_causes() {
     assert!(["stiffness", "areal-mass"].iter().all(|id| named.iter().any(|name| name == id)), "{named:?}");
     assert!(!named.iter().any(|name| name == "actuation-gain"), "{named:?}");
     assert!(d["next_experiment"].is_string());
+    // The page has every number beside the models, in its unit, and the constants that would reach them in theirs.
+    let page = fs::read_to_string(folder.path().join("d/report.html")).unwrap();
+    let document = roxmltree::Document::parse(pages::markup(&page)).unwrap();
+    pages::check_self_contained(&document);
+    assert_eq!(pages::wrong_numbers(&document), Vec::<String>::new());
+    assert!(document.descendants().any(|n| pages::has_class(&n, "verdict")));
+    let cells = pages::texts(&document, "td");
+    let has = |row: &[&str]| cells.windows(row.len()).any(|cells| cells == row);
+    assert!(has(&["tip deflection (mm)", "constant voltage, −1000\u{a0}V", "−20.00", "0.50"]), "{cells:?}");
+    assert!(has(&["resonance (Hz)", "sine, −1500\u{a0}V", "23.00", "0.50"]), "{cells:?}");
+    assert!(cells.windows(5).any(|c| c[1] == "mass per area" && c[4] == "kg/m²"), "{cells:?}");
+    assert!(!cells.iter().any(|cell| cell.contains("areal-mass") || cell == "scale"), "{cells:?}");
 }
 
 #[test]

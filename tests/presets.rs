@@ -1,8 +1,13 @@
 //! Every preset, class, scan and study runs, if only for a moment.
 
+mod common;
+
 use std::fs;
 use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
 
+use common::pages;
+use serde_json::Value;
 use sfers::experiment::presets::{CLASSES, PRESETS, SWEEPS};
 use sfers::experiment::{self, Control, Experiment, Source};
 use sfers::recording::measures::Measures;
@@ -82,31 +87,127 @@ fn the_table_of_classes_in_the_documents_is_current() {
 }
 
 /// The studies that take seconds; scripts/test.sh --long does all of them.
+const SHORT: [&str; 6] =
+    ["cantilever-shapes", "cantilever-damping", "robot-shapes", "jump-14hz", "key-shapes-14hz", "jump-frequency"];
+
+/// Their page and their results.json, made once.
+fn reproduction() -> &'static (String, Value) {
+    static MADE: OnceLock<(String, Value)> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("paper");
+        let arguments = [&["reproduce"], &SHORT[..], &["--quick", "--out", out.to_str().unwrap()]].concat();
+        let output = sfers(&arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        for id in SHORT {
+            assert!(roxmltree::Document::parse(&fs::read_to_string(out.join(format!("{id}.svg"))).unwrap()).is_ok());
+        }
+        assert!(fs::read_to_string(out.join("table.md")).unwrap().contains("jump-14hz"));
+        let results = serde_json::from_str(&fs::read_to_string(out.join("results.json")).unwrap()).unwrap();
+        (fs::read_to_string(out.join("index.html")).unwrap(), results)
+    })
+}
+
+fn study<'a>(results: &'a Value, id: &str) -> &'a Value {
+    results["results"].as_array().unwrap().iter().find(|study| study["id"] == id).unwrap()
+}
+
+/// The number that a text begins with.
+fn number(text: &Value) -> f64 {
+    let first = text.as_str().unwrap().split(' ').next().unwrap();
+    first.replace('−', "-").parse().unwrap_or_else(|_| panic!("{text}"))
+}
+
 #[test]
 fn a_reproduction_makes_its_page_tables_and_figures() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("paper");
-    let ids = ["cantilever-damping", "robot-shapes", "jump-14hz", "key-shapes-14hz"];
-    let arguments = [&["reproduce"], &ids[..], &["--quick", "--out", out.to_str().unwrap()]].concat();
-    let output = sfers(&arguments);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let page = fs::read_to_string(out.join("index.html")).unwrap();
-    let results: serde_json::Value = serde_json::from_str(&fs::read_to_string(out.join("results.json")).unwrap()).unwrap();
-    for (id, result) in ids.iter().zip(results["results"].as_array().unwrap()) {
+    let (page, results) = reproduction();
+    for (id, result) in SHORT.iter().zip(results["results"].as_array().unwrap()) {
         assert_eq!(result["id"], *id);
         assert!(!result["comparisons"].as_array().unwrap().is_empty());
         assert!(page.contains(&format!("<section id=\"{id}\">")));
-        assert!(roxmltree::Document::parse(&fs::read_to_string(out.join(format!("{id}.svg"))).unwrap()).is_ok());
     }
     // The paper's numbers for jumping at 14 Hz, with no number fitted: 7.5 to 8.5 mm, twice the drive's period.
-    let jump = &results["results"][2]["comparisons"];
-    let number = |text: &serde_json::Value| text.as_str().unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let jump = &study(results, "jump-14hz")["comparisons"];
     assert!((7.5..=8.5).contains(&number(&jump[0]["ours"])), "{jump}");
-    assert!(jump[1]["ours"].as_str().unwrap().ends_with("on Bullet"), "{jump}");
-    assert_eq!(number(&jump[2]["ours"]), 2.0, "{jump}");
-    let kinds = results["results"][3]["comparisons"].as_array().unwrap().iter().take(3);
-    assert!(kinds.map(|c| c["ours"] != "does not occur").eq([true; 3]));
-    assert!(fs::read_to_string(out.join("table.md")).unwrap().contains("jump-14hz"));
+    assert_eq!((number(&jump[1]["ours"]), number(&jump[1]["bullet"])), (2.0, 2.0), "{jump}");
+    let kinds = study(results, "key-shapes-14hz")["comparisons"].as_array().unwrap();
+    assert!(kinds.len() == 3 && kinds.iter().all(|c| c["ours"] != "does not occur"), "{kinds:?}");
+}
+
+#[test]
+fn one_experiment_has_one_height_in_all_studies_and_one_on_bullet() {
+    let (_, results) = reproduction();
+    let rows = results["results"].as_array().unwrap().iter().flat_map(|study| study["comparisons"].as_array().unwrap());
+    let heights: Vec<_> = rows.filter(|row| row["quantity"] == "height of the lowest point at 14 Hz").collect();
+    assert_eq!(heights.len(), 2, "{heights:?}");
+    assert_eq!((&heights[0]["ours"], &heights[0]["bullet"]), (&heights[1]["ours"], &heights[1]["bullet"]));
+    assert_eq!(heights[0]["difference"], heights[1]["difference"]);
+}
+
+#[test]
+fn every_published_value_of_a_study_is_drawn_in_its_figure() {
+    let (page, results) = reproduction();
+    let document = roxmltree::Document::parse(pages::markup(page)).unwrap();
+    // What the paper gives in numbers, by study: x and y, absent where it gives the other alone.
+    let given: [(&str, &[(Option<f64>, Option<f64>)]); 3] = [
+        ("cantilever-shapes", &[(None, Some(-20.0))]),
+        ("jump-14hz", &[(None, Some(7.5)), (None, Some(8.0))]),
+        ("jump-frequency", &[(Some(14.0), Some(7.5)), (Some(14.0), Some(8.0))]),
+    ];
+    for (id, values) in given {
+        let section = document.descendants().find(|n| n.attribute("id") == Some(id)).unwrap();
+        let svg = section.descendants().find(|n| n.tag_name().name() == "svg").unwrap();
+        let [x, y] = pages::axes(svg);
+        let marks = pages::marks(svg);
+        let published = study(results, id)["published"].as_array().unwrap();
+        assert_eq!(published.len(), values.len(), "{id}: {published:?}");
+        for ((at_x, at_y), told) in values.iter().zip(published) {
+            assert_eq!(told["y"].as_f64(), *at_y, "{id}");
+            assert!(at_x.is_none() || told["x"].as_f64() == *at_x, "{id}: {told}");
+            // Within the size of a marker.
+            let near = |at: Option<f64>, [offset, scale]: [f64; 2], place: f64| {
+                at.is_none_or(|value| (offset + scale * value - place).abs() < 4.0)
+            };
+            let (at_x, at_y) = (told["x"].as_f64(), told["y"].as_f64());
+            let found = marks.iter().any(|mark| near(at_x, x, mark.0) && near(at_y, y, mark.1));
+            assert!(found, "{id}: {told} is not in the figure: {x:?} {y:?} {marks:?}");
+            let words = told["label"].as_str().unwrap();
+            assert!(
+                svg.descendants().filter(roxmltree::Node::is_text).any(|n| words.contains(n.text().unwrap().trim())),
+                "{words}"
+            );
+        }
+    }
+    // An arc of 100 mm that ends 20 mm low ends near 97.3 mm.
+    let tip = &study(results, "cantilever-shapes")["published"][0];
+    assert!((tip["x"].as_f64().unwrap() - 97.3).abs() < 0.1, "{tip}");
+}
+
+#[test]
+fn every_number_of_the_reproduction_says_which_engine_it_is_of() {
+    let (page, results) = reproduction();
+    let document = roxmltree::Document::parse(pages::markup(page)).unwrap();
+    for section in document.descendants().filter(|n| n.has_tag_name("section")) {
+        let heads: Vec<String> = section.descendants().filter(|n| n.has_tag_name("th")).map(pages::text).collect();
+        assert_eq!(heads[2..5], ["ours (planar engine)", "ours − published", "spot check (Bullet)"]);
+        let engines = section.descendants().find(|n| pages::has_class(n, "engines")).map(pages::text).unwrap();
+        assert!(engines.contains("planar engine, time step 20 µs") && engines.contains("Bullet, time step"), "{engines}");
+    }
+    for result in results["results"].as_array().unwrap() {
+        let rows = result["comparisons"].as_array().unwrap();
+        assert!(rows.iter().any(|row| row["bullet"] != ""), "{}: no spot check", result["id"]);
+        assert!(rows.iter().all(|row| !row["ours"].as_str().unwrap().contains("Bullet")), "{}", result["id"]);
+    }
+}
+
+#[test]
+fn the_reproduction_has_true_minus_signs_no_negative_zeros_and_nothing_from_outside() {
+    let (page, _) = reproduction();
+    let document = roxmltree::Document::parse(pages::markup(page)).unwrap();
+    assert_eq!(pages::wrong_numbers(&document), Vec::<String>::new());
+    pages::check_self_contained(&document);
+    let cells = pages::texts(&document, "td");
+    assert!(cells.iter().any(|cell| cell.starts_with("−18.99 mm")), "{cells:?}");
 }
 
 #[test]

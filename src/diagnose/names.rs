@@ -142,7 +142,7 @@ pub fn shown(id: &str, estimate: &Estimate, constants: &[(&str, f64, &str)]) -> 
     let end = |end: Option<f64>| end.map_or_else(|| "open".into(), |end| fixed(end, digits));
     let mut notes = Vec::new();
     if let Some((_, nominal, _)) = constant {
-        notes.push(format!("{} × the nominal {}", fixed(estimate.value, 3), fixed(*nominal, digits.max(1))));
+        notes.push(format!("{} × the nominal {}", fixed(estimate.value, 3), fixed(*nominal, digits)));
     }
     if estimate.at_bound {
         notes.push("at the end of what is tried".into());

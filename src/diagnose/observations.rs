@@ -217,7 +217,7 @@ fn setting(observation: &Observation) -> String {
         Some(name) => name,
         None => "gait",
     };
-    if volts.is_empty() { waveform.into() } else { format!("{waveform}, {volts} V") }
+    if volts.is_empty() { waveform.into() } else { format!("{waveform}, {volts}\u{a0}V") }
 }
 
 /// What single numbers say: which single causes and which pairs of constants reach them.
@@ -400,11 +400,10 @@ pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
     let mut out = report::heading(d);
     out.push_str(
         "<p class=\"small\">Single numbers cannot be split into some to fit and some to judge by: they rule causes out, and say what ties them, but name \
-         none.</p>\n<h2>The numbers</h2>\n",
+         none. σ is one standard deviation.</p>\n<h2>The numbers</h2>\n",
     );
-    let columns =
-        ["number", "under", "#measured", "#± one standard deviation", "#nominal model", "#off by (standard deviations)"];
-    let mut table = Table::new(&[&columns[..], &["#with the best below", "#off by (standard deviations)"]].concat());
+    let columns = ["number", "under", "#measured", "#± one σ", "#nominal model", "#off by (σ)"];
+    let mut table = Table::new(&[&columns[..], &["#with the best below", "#off by (σ)"]].concat()).stacking();
     for number in numbers {
         let digits = digits_for(number.sigma);
         let off = |predicted: f64| (number.value - predicted) / number.sigma;
@@ -429,15 +428,8 @@ pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
         });
     } else {
         let constants = names::constants(&dataset.robot);
-        let mut table = Table::new(&[
-            "cause, form",
-            "constant",
-            "#value",
-            "#95 % range",
-            "unit",
-            "remark",
-            "#misfit (standard deviations, rms)",
-        ]);
+        let mut table =
+            Table::new(&["cause, form", "constant", "#value", "#95 % range", "unit", "remark", "#misfit (σ, rms)"]).stacking();
         for way in ways {
             for effect in &way.effects {
                 for estimate in &effect.parameters {
@@ -459,7 +451,7 @@ pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
         out += &format!("<p class=\"small\">Each of them does it alone; the numbers cannot tell which it is.{two}</p>\n");
     }
     out.push_str("<h2>All causes tried, one at a time</h2>\n");
-    let mut table = Table::new(&["cause, form", "#misfit (standard deviations, rms)"]);
+    let mut table = Table::new(&["cause, form", "#misfit (σ, rms)"]);
     for c in &d.candidates {
         table.row([names::with_form(&c.id, &c.form).into(), fixed(c.rmse_heldout_mm, 2).into()]);
     }

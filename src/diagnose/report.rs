@@ -110,7 +110,7 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
         "<h2>How to reproduce</h2>\n<p><code>{}</code></p><p>The extended model, <code>extended.toml</code>; run it with \
          <code>sfers run extended.toml</code>:</p><pre>{}</pre>\n",
         escape(context.command),
-        escape(context.extended)
+        context.extended.lines().map(escape).collect::<Vec<_>>().join("\n")
     );
     document(&format!("Diagnosis of {}", d.dataset), &out)
 }
@@ -215,7 +215,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
     if d.effects.is_empty() {
         out.push_str("<p>Nothing was added to the nominal model.</p>\n");
     } else {
-        let mut table = Table::new(&["cause, form", "constant", columns[0], columns[1], columns[2], columns[3]]);
+        let mut table = Table::new(&["cause, form", "constant", columns[0], columns[1], columns[2], columns[3]]).stacking();
         for effect in &d.effects {
             for estimate in &effect.parameters {
                 let shown = names::shown(&effect.id, estimate, &constants);
@@ -247,7 +247,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         let candidate = &context.plant.candidates()[term.candidate];
         candidate.parameters.iter().map(|_| candidate.id)
     });
-    let mut table = Table::new(&["constant", columns[0], columns[1], columns[2], columns[3]]);
+    let mut table = Table::new(&["constant", columns[0], columns[1], columns[2], columns[3]]).stacking();
     for (id, estimate) in ids.zip(&d.calibrated.parameters) {
         let shown = names::shown(id, estimate, &constants);
         let name = if shown.name == names::cause(id) { shown.name } else { format!("{}, {}", names::cause(id), shown.name) };

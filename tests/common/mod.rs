@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // every user takes a part of it
 
+pub mod pages;
+
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
