@@ -23,14 +23,14 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
     let given = |name: &str| fixed.iter().find(|(key, _)| key.as_ref() == name).map(|(_, value)| *value);
     match id {
         "hysteresis" => match (given("plays"), given("from_zero")) {
-            (Some(plays), _) if plays == 0.0 => "Bouc–Wen".into(),
-            (Some(_), Some(from)) if from == 1.0 => "plays that come from 0 V (Prandtl–Ishlinskii)".into(),
+            (Some(0.0), _) => "Bouc–Wen".into(),
+            (Some(_), Some(1.0)) => "plays that come from 0 V (Prandtl–Ishlinskii)".into(),
             (Some(_), _) => "plays at rest at the first voltage (Prandtl–Ishlinskii)".into(),
             _ => String::new(),
         },
         "creep" => match given("rungs_per_decade") {
-            Some(count) if count == 0.0 => "one time constant".into(),
-            Some(count) if count == 1.0 => "one time constant in a decade".into(),
+            Some(0.0) => "one time constant".into(),
+            Some(1.0) => "one time constant in a decade".into(),
             Some(count) => format!("{count} time constants in a decade"),
             None => String::new(),
         },
