@@ -9,7 +9,7 @@ use super::picture;
 use super::plant::{Plant, Signal};
 use super::verdict::Outcome;
 use crate::model::Robot;
-use crate::view::page::{Cell, Table, document, figure};
+use crate::view::page::{Cell, HALF, Table, document, figure};
 use crate::view::{Figure, Mark, digits_for, escape, fixed, minus, signed, significant};
 
 /// Runs that are drawn, and rows of each at most.
@@ -167,6 +167,7 @@ fn motion(out: &mut String, outcome: &Outcome, run: usize, signal: &Signal, chan
     out.push_str("<div class=\"pair\">\n");
     for (kind, residuals) in [("nominal", &outcome.nominal.residuals[run]), ("extended", &outcome.extended.residuals[run])] {
         let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", label);
+        f.size(HALF);
         let used = |i: &&usize| outcome.used[run][**i];
         f.series("measured", rows.iter().filter(used).map(|i| (signal.times[*i], signal.values[*i])), Mark::Line);
         let simulated =
@@ -182,7 +183,7 @@ fn residuals(out: &mut String, outcome: &Outcome, run: usize, signal: &Signal, c
     out.push_str("<div class=\"pair\">\n");
     for (kind, residuals) in [("re-tuned", &outcome.calibrated.residuals[run]), ("extended", &outcome.extended.residuals[run])] {
         let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", "residual / noise");
-        f.horizontal(0.0);
+        f.horizontal(0.0).size(HALF);
         let used = rows.iter().filter(|i| outcome.used[run][**i]);
         f.series("", used.map(|i| (signal.times[*i], residuals[*i])), Mark::Line);
         out.push_str(&figure(&format!("residual-{kind}-{index}"), "", &f.svg(), ""));

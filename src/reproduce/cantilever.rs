@@ -7,6 +7,7 @@ use crate::model::{Material, Mount};
 use crate::recording::measures::Measures;
 use crate::recording::signal::Mode;
 use crate::sweep::Sweep;
+use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, shape, signed};
 
 /// Measured deflection of the tip at −1000 V (mm), and frequencies (Hz) of the largest response: measured, and the authors' simulation.
@@ -22,8 +23,8 @@ const SPOTS_STEP: f64 = 5e-6;
 
 pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
-    let mut figure = Figure::new("Static shapes of the cantilever at 0, −600, −800 and −1000 V, m = 3", "x (mm)", "z (mm)");
-    figure.equal_aspect();
+    let mut figure = Figure::new("Static shapes of the cantilever", "x (mm)", "z (mm)");
+    figure.setting("0, −600, −800 and −1000 V, m = 3").filled_aspect().size(WHOLE);
     for (name, set) in SETS {
         // One line for all voltages, broken between them: a set is one entry of the legend.
         let mut shapes = Vec::new();
@@ -73,8 +74,8 @@ fn arc_end(deflection: f64) -> f64 {
 
 pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
-    let mut figure =
-        Figure::new("Response of the cantilever to a sinusoid between 0 and −1500 V", "frequency (Hz)", "tip amplitude (mm)");
+    let mut figure = Figure::new("Frequency response of the cantilever", "frequency (Hz)", "tip amplitude (mm)");
+    figure.setting("sinusoid between 0 and −1500 V, dampingEta 0.008").from_zero().size(WHOLE);
     let (mut spots, mut highest) = (Vec::new(), 0.0);
     for (name, set) in SETS {
         let id = format!("cantilever-response-{}", name.replace(' ', "-"));
@@ -155,7 +156,8 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
 
 pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
-    let mut figure = Figure::new("Cantilever after a step to −1500 V, m = 3, set 2", "time (ms)", "height of the tip (mm)");
+    let mut figure = Figure::new("Step response of the cantilever", "time (ms)", "height of the tip (mm)");
+    figure.setting("0 to −1500 V at once, m = 3, set 2").size(WHOLE);
     for eta in [0.008, 0.03, 0.045] {
         let (experiment, run) = bench.run("cantilever-step", &[&format!("robot.damping_eta={eta}")])?;
         let r = &run.recording;

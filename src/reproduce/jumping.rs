@@ -5,6 +5,7 @@ use crate::experiment::Experiment;
 use crate::model::Mount;
 use crate::recording::Recording;
 use crate::recording::measures::{ContactState, Measures, contact_states};
+use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, shape, signed};
 
 /// The authors' own simulated curve, read off their published plot to ±0.03 mm.
@@ -119,7 +120,8 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
 
     let end = recording.time[recording.len() - 1];
     let from = recording.time.partition_point(|&t| t < end - 4.0 * PERIOD);
-    let mut figure = Figure::new("In-place jumping at 14 Hz, (300, 300, −1500, 300, 300) V", "time (ms)", "height z (mm)");
+    let mut figure = Figure::new("In-place jumping at 14 Hz", "time (ms)", "height z (mm)");
+    figure.setting("(300, 300, −1500, 300, 300) V, friction 1.0, dampingEta 0.045").from_zero().size(WHOLE);
     let node = |node: usize| {
         (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * recording.node(i, node)[2])).collect::<Vec<_>>()
     };
@@ -131,15 +133,11 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
         (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * lowest(i))),
         Mark::Line,
     );
-    let volts = |i: usize| recording.motor_voltages[i * recording.joints() + recording.joints() / 2];
-    figure.series(
-        "drive (−3: on, −4: off)",
-        (from..recording.len()).map(|i| (1e3 * recording.time[i], if volts(i) < 0.0 { -3.0 } else { -4.0 })),
-        Mark::Line,
-    );
     let times = [1e3 * recording.time[from], 1e3 * end];
-    findings.publish_across(&mut figure, "measured: lowest point at least 7.5 mm", Origin::Measured, MEASURED[0], times);
-    findings.publish_across(&mut figure, "about 8 mm", Origin::Measured, MEASURED[1], times);
+    findings.publish_across(&mut figure, "measured, lowest point: 7.5 to about 8 mm", Origin::Measured, &MEASURED, times);
+    let volts = |i: usize| recording.motor_voltages[i * recording.joints() + recording.joints() / 2];
+    let drive = (from..recording.len()).map(|i| (1e3 * recording.time[i], volts(i)));
+    figure.panel("voltage").share(0.1).strip("middle", "0 to −1500 V", drive);
     findings.figure = figure.svg();
     findings.caption = "The last four periods of 1.2 s. The robot repeats its motion after two periods of the voltage. The lines across are the \
                         measured height of the lowest point."
@@ -153,8 +151,8 @@ pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
     findings.done_on(&experiment, Some(there.time_step));
     let (found, on_bullet) = (best_moments(&recording), best_moments(&spot_recording));
-    let mut figure = Figure::new("Key shapes of in-place jumping at 14 Hz, (300, 300, −1500, 300, 300) V", "x (mm)", "z (mm)");
-    figure.equal_aspect().without_y_numbers();
+    let mut figure = Figure::new("Key shapes of in-place jumping at 14 Hz", "x (mm)", "z (mm)");
+    figure.setting("planar engine, (300, 300, −1500, 300, 300) V").size(WHOLE);
     let told = |recording: &Recording, moment: Option<usize>| {
         let Some(i) = moment else { return "does not occur".to_owned() };
         let middle = fixed(10.0 * recording.node(i, recording.nodes() / 2)[2], 1);
@@ -162,11 +160,13 @@ pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
         format!("ends {end} mm, midpoint {middle} mm, lowest {low} mm")
     };
     for (row, ((state, moment), (_, spot))) in found.into_iter().zip(on_bullet).enumerate() {
-        let floor = -60.0 * row as f64;
-        figure.horizontal(floor);
+        if row > 0 {
+            figure.panel("z (mm)");
+        }
+        figure.filled_aspect().floor().panel_title(name(state));
         if let Some(i) = moment {
-            figure.line("", shape(&recording, i).into_iter().map(|(x, z)| (x, z + floor)), "#0072b2", 3.0);
-            figure.note(0.0, floor + 34.0, &format!("{}, {:.1} ms", name(state), 1e3 * recording.time[i]));
+            figure.panel_title(&format!("{}, {} ms", name(state), fixed(1e3 * recording.time[i], 1)));
+            figure.robot("", shape(&recording, i), "#0072b2");
         }
         let difference = if moment.is_none() { "differs" } else { "" };
         let explanation = "The figure's points are not published as numbers.";
@@ -176,8 +176,7 @@ pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
         }
     }
     findings.figure = figure.svg();
-    findings.caption =
-        "Planar engine. Of each kind the moment in the last two periods that shows it best, each on a floor of its own.".into();
+    findings.caption = "Planar engine. Of each kind the moment in the last two periods that shows it best.".into();
     Ok(findings)
 }
 
@@ -228,8 +227,8 @@ pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
         findings.check_on_bullet("mm", ours, on_bullet);
     }
     findings.without_result(&heights);
-    let mut figure =
-        Figure::new("In-place jumping against frequency, (300, 300, −1500, 300, 300) V", "frequency (Hz)", "jump height (mm)");
+    let mut figure = Figure::new("In-place jumping against frequency", "frequency (Hz)", "jump height (mm)");
+    figure.setting("(300, 300, −1500, 300, 300) V, friction 1.0, dampingEta 0.045").from_zero().size(WHOLE);
     figure.series("planar engine", heights, Mark::Both);
     figure.series("Bullet", bullet, Mark::Points);
     findings.publish(&mut figure, "measured at 14 Hz: 7.5 to about 8 mm", Origin::Measured, &MEASURED.map(|z| (14.0, z)), None);
@@ -296,11 +295,8 @@ pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
         ),
     );
     let ms = |points: &[(f64, f64)]| points.iter().map(|p| (1e3 * p.0, p.1)).collect::<Vec<_>>();
-    let mut figure = Figure::new(
-        "A single jump, (520, 520, −1500, 520, 520) V until the on-time of the middle three",
-        "on-time (ms)",
-        "jump height (mm)",
-    );
+    let mut figure = Figure::new("A single jump against on-time", "on-time (ms)", "jump height (mm)");
+    figure.setting("(520, 520, −1500, 520, 520) V, the middle three until the on-time").from_zero().size(WHOLE);
     figure.series("planar engine", ms(&ours), Mark::Both);
     figure.series("Bullet", ms(&bullet), Mark::Points);
     findings.publish(&mut figure, "authors' simulation, ±0.03 mm", Origin::Simulated, &ms(&theirs), Some(READ_OFF));

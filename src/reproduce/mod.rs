@@ -154,21 +154,24 @@ impl Findings {
         figure.series(label, points.iter().copied(), Mark::Points);
         for &(x, y) in points {
             if let Some(spread) = plus_minus {
-                figure.line("", [(x, y - spread), (x, y + spread)], PUBLISHED, 1.2);
+                figure.line("", [(x, y - spread), (x, y + spread)], PUBLISHED, 1.0);
             }
             self.published.push(Published { label: label.into(), origin, x: Some(x), y: Some(y), plus_minus });
         }
     }
 
-    /// Draws a published value of y as a line across from one x to another.
-    fn publish_across(&mut self, figure: &mut Figure, label: &str, origin: Origin, y: f64, [from, to]: [f64; 2]) {
-        figure.line("", [(from, y), (to, y)], PUBLISHED, 1.2).note(from, y, label);
-        self.published.push(Published { label: label.into(), origin, x: None, y: Some(y), plus_minus: None });
+    /// Draws published values of y as lines across from one x to another.
+    fn publish_across(&mut self, figure: &mut Figure, label: &str, origin: Origin, values: &[f64], [from, to]: [f64; 2]) {
+        for &y in values {
+            figure.line("", [(from, y), (to, y)], PUBLISHED, 1.0);
+            self.published.push(Published { label: label.into(), origin, x: None, y: Some(y), plus_minus: None });
+        }
+        figure.note(from, values.iter().copied().fold(f64::NEG_INFINITY, f64::max), label);
     }
 
     /// Draws a published value of x as a line up from one y to another.
     fn publish_up(&mut self, figure: &mut Figure, label: &str, origin: Origin, x: f64, [from, to]: [f64; 2]) {
-        figure.line("", [(x, from), (x, to)], PUBLISHED, 1.2).note(x, to, label);
+        figure.line("", [(x, from), (x, to)], PUBLISHED, 1.0).note(x, to, label);
         self.published.push(Published { label: label.into(), origin, x: Some(x), y: None, plus_minus: None });
     }
 

@@ -3,6 +3,7 @@
 use super::{Bench, Findings, Origin, StudyError, curve};
 use crate::model::Mount;
 use crate::recording::measures::Measures;
+use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, minus, shape, signed};
 
 /// The voltages of the real robot, the gain that turns them into the code's, and films of high friction under a smooth robot. The paper
@@ -25,8 +26,8 @@ const SPEEDS: [(f64, f64); 2] = [(8.0, -7.0), (14.0, 12.0)];
 
 pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
-    let mut figure = Figure::new("Static shapes of the five-actuator robot on the floor", "x (mm)", "z (mm)");
-    figure.horizontal(0.0);
+    let mut figure = Figure::new("Static shapes of the five-actuator robot", "x (mm)", "z (mm)");
+    figure.setting("constant voltages, on the floor, m = 3").filled_aspect().floor().size(WHOLE);
     for volts in ["0,300,-960,300,0", "300,300,-960,300,0"] {
         let settings = [&format!("drive.voltages_v=[{volts}]"), "robot.positive_gain=1.733"];
         let (experiment, run) = bench.run("static-shape", &settings)?;
@@ -75,7 +76,8 @@ pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     findings.done_on(&experiment, Some(there.time_step));
     let bullet = Measures::of(&spot.recording, Mount::Ground, Some(1.0)).stride_mm.unwrap_or(f64::NAN);
     findings.check_on_bullet("mm", stride, bullet);
-    let mut figure = Figure::new("Inchworm motion at 1 Hz, (300, 300, −1500, 300, 300) V", "time (s)", "travel along x (mm)");
+    let mut figure = Figure::new("Inchworm motion", "time (s)", "travel along x (mm)");
+    figure.setting("1 Hz, (300, 300, −1500, 300, 300) V, friction 0.2 and 4.0").size(WHOLE);
     let x = |i: usize, node: usize| 10.0 * r.node(i, node)[0];
     let ends = [0, r.nodes() - 1];
     // All from where the robot's ends are in the mean at the beginning of the second cycle, as the first begins from rest.
@@ -130,11 +132,8 @@ pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
     findings.without_result(&speeds);
     let (low, high) =
         speeds.iter().chain(&bullet).chain(&SPEEDS).map(|p| p.1).fold((0.0, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
-    let mut figure = Figure::new(
-        "Speed of the inchworm sequence, (300, 300, −1500, 300, 300) V, friction 0.2 and 4.0",
-        "frequency (Hz)",
-        "speed (mm/s)",
-    );
+    let mut figure = Figure::new("Speed of the inchworm sequence", "frequency (Hz)", "speed (mm/s)");
+    figure.setting("(300, 300, −1500, 300, 300) V, friction 0.2 and 4.0").size(WHOLE);
     figure.horizontal(0.0);
     figure.series("planar engine", speeds, Mark::Both);
     figure.series("Bullet", bullet, Mark::Points);

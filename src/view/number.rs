@@ -76,16 +76,7 @@ pub fn digits_for(spread: f64) -> usize {
 /// assert_eq!(minus("step-1000v: (-3.5 to -.2)"), "step-1000v: (−3.5 to −.2)");
 /// ```
 pub fn minus(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut before = ' ';
-    let mut rest = text.chars().peekable();
-    while let Some(c) = rest.next() {
-        let is_sign =
-            c == '-' && !before.is_alphanumeric() && rest.peek().is_some_and(|next| next.is_ascii_digit() || *next == '.');
-        out.push(if is_sign { '−' } else { c });
-        before = c;
-    }
-    out
+    super::text::minus_signs(text)
 }
 
 #[cfg(test)]

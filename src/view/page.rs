@@ -2,7 +2,12 @@
 
 use std::fmt::Write;
 
-use super::escape;
+use super::{Size, escape};
+
+/// A figure across the page, readable when a phone shrinks it by a quarter.
+pub(crate) const WHOLE: Size = Size { width_mm: 130.0, font_pt: 9.0 };
+/// One of two figures beside one another.
+pub(crate) const HALF: Size = Size { width_mm: 115.0, font_pt: 8.5 };
 
 const STYLE: &str = include_str!("page.css");
 

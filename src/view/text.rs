@@ -56,9 +56,7 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     if digits > 6 || value.abs() >= 1e7 {
         return format!("{value:.1e}").replace('-', "−");
     }
-    let text = format!("{value:.digits$}");
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
+    super::fixed(value, digits)
 }
 
 /// A number with about `digits` significant digits, without trailing zeros.
