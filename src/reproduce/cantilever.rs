@@ -24,7 +24,8 @@ const SPOTS_STEP: f64 = 5e-6;
 pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
     let mut figure = Figure::new("Static shapes of the cantilever", "x (mm)", "z (mm)");
-    figure.setting("0, −600, −800 and −1000 V, m = 3").filled_aspect().size(WHOLE);
+    figure.setting("from above: 0, −600, −800 and −1000 V; m = 3").size(WHOLE);
+    let mut left = 0.0;
     for (name, set) in SETS {
         // One line for all voltages, broken between them: a set is one entry of the legend.
         let mut shapes = Vec::new();
@@ -32,9 +33,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
             let (experiment, run) = bench.run("cantilever-dc", &[set, &format!("drive.voltages_v=[{volts}]")])?;
             let r = &run.recording;
             shapes.extend(shape(r, r.len() - 1));
-            if let Some(&(x, z)) = shapes.last().filter(|_| name == "set 2") {
-                figure.note(x, z, &format!("{} V", fixed(f64::from(volts), 0)));
-            }
+            left = shapes[0].0;
             shapes.push((f64::NAN, f64::NAN));
             let tip = Measures::of(r, Mount::Clamped, None).tip_deflection_mm.unwrap_or(f64::NAN);
             if volts == -1000 {
@@ -53,12 +52,12 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
         }
         figure.series(&format!("planar engine, {name}"), shapes, Mark::Line);
     }
-    let tip = [(arc_end(DEFLECTION), DEFLECTION)];
+    let tip = [(left + arc_end(DEFLECTION), DEFLECTION)];
     findings.publish(&mut figure, "measured tip, −1000 V", Origin::Measured, &tip, None);
     findings.figure = figure.svg();
     findings.caption =
         "Shapes at rest, gravity included, for both published sets of constants. The paper gives the tip's deflection alone; \
-                        its x is that of a circular arc. It gives no accuracy."
+                        its x is that of a circular arc from the left end. It gives no accuracy. Heights are drawn larger than lengths."
             .into();
     Ok(findings)
 }

@@ -73,8 +73,11 @@ fn beside_measured(height: f64) -> String {
     if (MEASURED[0]..=MEASURED[1]).contains(&height) {
         return "within".into();
     }
-    let nearest = if height > MEASURED[1] { MEASURED[1] } else { MEASURED[0] };
-    format!("{} mm of {nearest} mm", signed(height - nearest, 2))
+    if height > MEASURED[1] {
+        format!("{} mm above {} mm", fixed(height - MEASURED[1], 2), MEASURED[1])
+    } else {
+        format!("{} mm below {} mm", fixed(MEASURED[0] - height, 2), MEASURED[0])
+    }
 }
 
 pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {

@@ -20,7 +20,7 @@ use thiserror::Error;
 use crate::engine::EngineError;
 use crate::experiment::{self, ConfigError, Control, Experiment, Run, Source, presets};
 use crate::sweep::{self, Row as Point, RowError, Rows, Sweep};
-use crate::view::{Figure, Mark, fixed, signed, significant};
+use crate::view::{Figure, Mark, fixed, signed};
 
 /// Colour of lines that stand for published values.
 const PUBLISHED: &str = "#777777";
@@ -134,9 +134,13 @@ impl Findings {
     /// A spot check of the last comparison: its number on the planar engine and on Bullet.
     fn check_on_bullet(&mut self, unit: &str, planar: f64, bullet: f64) {
         let Some(last) = self.comparisons.last_mut() else { return };
+        let (digits, unit) = match unit {
+            "" | "°" => (0, unit.to_owned()),
+            _ => (2, format!(" {unit}")),
+        };
         last.bullet = match (bullet.is_finite(), planar.is_finite()) {
-            (true, true) => format!("{} {unit} (planar {})", fixed(bullet, 2), signed(planar - bullet, 2)),
-            (true, false) => format!("{} {unit}", fixed(bullet, 2)),
+            (true, true) => format!("{}{unit} (planar {})", fixed(bullet, digits), signed(planar - bullet, digits)),
+            (true, false) => format!("{}{unit}", fixed(bullet, digits)),
             (false, _) => "none: its contact makes energy, or it limits a velocity".into(),
         };
     }
@@ -162,11 +166,10 @@ impl Findings {
 
     /// Draws published values of y as lines across from one x to another.
     fn publish_across(&mut self, figure: &mut Figure, label: &str, origin: Origin, values: &[f64], [from, to]: [f64; 2]) {
-        for &y in values {
-            figure.line("", [(from, y), (to, y)], PUBLISHED, 1.0);
+        for (index, &y) in values.iter().enumerate() {
+            figure.line(if index == 0 { label } else { "" }, [(from, y), (to, y)], PUBLISHED, 1.0);
             self.published.push(Published { label: label.into(), origin, x: None, y: Some(y), plus_minus: None });
         }
-        figure.note(from, values.iter().copied().fold(f64::NEG_INFINITY, f64::max), label);
     }
 
     /// Draws a published value of x as a line up from one y to another.
@@ -177,7 +180,10 @@ impl Findings {
 
     /// Says which engines did the runs.
     fn done_on(&mut self, planar: &Experiment, bullet: Option<f64>) {
-        let step = |step: f64| format!("time step {} µs", significant(1e6 * step, 3));
+        let step = |step: f64| {
+            let micros = 1e6 * step;
+            format!("time step {} µs", fixed(micros, if (micros - micros.round()).abs() < 1e-6 { 0 } else { 2 }))
+        };
         self.engines = format!("Ours: planar engine, {}.", step(planar.time_step));
         if let Some(bullet) = bullet {
             self.engines += &format!(" Spot checks: Bullet, {}.", step(bullet));

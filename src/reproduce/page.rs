@@ -8,7 +8,7 @@ use crate::view::page::{Table, document, figure};
 
 /// Columns after the quantity: each number's engine stands over it.
 const COLUMNS: [&str; 6] =
-    ["quantity", "published", "ours (planar engine)", "ours − published", "spot check (Bullet)", "what explains it"];
+    ["quantity", "published", "ours (planar engine)", "difference", "spot check (Bullet)", "what explains it"];
 
 /// The findings as a self-contained HTML page. A study that failed stands there with its reason.
 pub fn page(effort: Effort, made_by: &str, results: &[(Study, Result<Findings, String>)]) -> String {
