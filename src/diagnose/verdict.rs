@@ -276,7 +276,8 @@ fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>,
         if switches.len() > 1 && gain > needed {
             continue;
         }
-        let numbers: Vec<String> = estimates(search, index, term, intervals).iter().map(|e| names::words(candidate.id, e)).collect();
+        let numbers: Vec<String> =
+            estimates(search, index, term, intervals).iter().map(|e| names::words(candidate.id, e)).collect();
         let words = format!(
             "the data are insufficient to name a cause: with {} ({}) they would be explained as well as without it, for the range reaches the value at \
              which it does nothing",
