@@ -46,7 +46,7 @@ fn the_sample_with_a_tip_mass_is_named_and_leaves_what_goes_on() {
     assert!((rms / d["extended"]["rmse_mm"].as_f64().unwrap() - 1.0).abs() < 1e-3, "{rms}");
     // One page with its figures, and no reference to anything outside.
     let page = fs::read_to_string(folder.path().join("d/report.html")).unwrap();
-    assert_eq!(page.matches("<svg").count(), 13);
+    assert_eq!(page.matches("<figure").count(), 13);
     let at = |words: &str| page.find(words).unwrap_or_else(|| panic!("{words}"));
     let order = [
         "class=\"verdict\"",
@@ -155,7 +155,7 @@ fn the_report_opens_in_a_browser_without_a_complaint() {
         .output()
         .unwrap();
     let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(dom.matches("<svg").count() == 13 && dom.contains("class=\"verdict\"><strong>Nothing "), "{dom}");
+    assert!(dom.matches("<figure").count() == 13 && dom.contains("class=\"verdict\"><strong>Nothing "), "{dom}");
     assert!(!log.contains("CONSOLE"), "{log}");
 }
 
