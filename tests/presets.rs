@@ -149,7 +149,8 @@ fn every_published_value_of_a_study_is_drawn_in_its_figure() {
     let (page, results) = reproduction();
     let document = roxmltree::Document::parse(pages::markup(page)).unwrap();
     // What the paper gives in numbers, by study: x and y, x absent where it gives y alone.
-    let given: [(&str, &[(Option<f64>, f64)]); 3] = [
+    type Given = (&'static str, &'static [(Option<f64>, f64)]);
+    let given: [Given; 3] = [
         ("cantilever-shapes", &[(None, -20.0)]),
         ("jump-14hz", &[(None, 7.5), (None, 8.0)]),
         ("jump-frequency", &[(Some(14.0), 7.5), (Some(14.0), 8.0)]),
