@@ -306,7 +306,8 @@ impl Table {
 }
 
 fn number_in(record: &csv::StringRecord, column: usize) -> Option<f64> {
-    record.get(column).and_then(|text| text.parse::<f64>().ok()).filter(|value| value.is_finite())
+    // Beyond 1e100, as in curves, nothing can be laid over pixels.
+    record.get(column).and_then(|text| text.parse::<f64>().ok()).filter(|value| value.abs() < 1e100)
 }
 
 fn unit_of(name: &str) -> Option<String> {
@@ -384,6 +385,28 @@ mod tests {
         let error = results(&format!("a.a,a.b,a.c,a.d,m,status\n{many}"), None).unwrap_err().to_string();
         assert!(error.contains("4 keys") && error.contains("a.c (0, 1,") && error.contains("--where"), "{error}");
         assert!(results("a.a,m,status\n", None).is_err());
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_laid_over_pixels_are_missing_in_a_map() {
+        let rows: Vec<String> = (0..36)
+            .map(|i| {
+                format!(
+                    "{},{},{},ok",
+                    i / 6,
+                    i % 6,
+                    if i == 3 {
+                        "1e308"
+                    } else if i == 9 {
+                        "-1e308"
+                    } else {
+                        "1"
+                    }
+                )
+            })
+            .collect();
+        let svg = results(&format!("a.b,c.d_hz,m_mm,status\n{}\n", rows.join("\n")), None).unwrap();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
 
     proptest! {
