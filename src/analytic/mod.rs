@@ -1,8 +1,10 @@
 //! Closed-form results that the program, its tests and its documents compare with.
 
-use nalgebra::DMatrix;
+mod stability;
 
-use crate::model::{Laminate, Mount, Robot};
+pub use stability::{highest_joint_frequency, stable_step, stable_step_at};
+
+use crate::model::{Laminate, Robot};
 
 /// First natural frequency (Hz) of a clamped Euler-Bernoulli beam, the limit of the cantilever for many joints.
 ///
@@ -61,75 +63,12 @@ pub fn phase_velocity(robot: &Robot, frequency: f64) -> f64 {
     (laminate.flexural_rigidity * omega.powi(2) / laminate.areal_density).powf(0.25)
 }
 
-/// Largest angular frequency ω (rad/s) at which the flat robot's joints vibrate against their springs, without contact.
-///
-/// ```text
-/// det(K − ω² M) = 0,   K = k·1,   M the mass matrix of the joints, the base held or eliminated
-/// ```
-pub fn highest_joint_frequency(robot: &Robot) -> f64 {
-    let joints = robot.joints();
-    let segments = robot.segments();
-    let thickness = robot.collision_thickness;
-    // Coordinates: height and pitch of the left end, then the joints. Each segment's centre moves in z by its distance to every
-    // turning point before it; x motion is of second order in a flat chain.
-    let size = joints + 2;
-    let mut mass = DMatrix::<f64>::zeros(size, size);
-    let mut left = 0.0;
-    let mut pivots: Vec<f64> = vec![0.0];
-    for segment in &segments {
-        let centre = left + 0.5 * segment.length;
-        let mut lift = vec![1.0];
-        lift.extend(pivots.iter().map(|pivot| -(centre - pivot)));
-        let mut turn = vec![0.0];
-        turn.extend(pivots.iter().map(|_| 1.0));
-        let inertia = segment.mass / 12.0 * (segment.length.powi(2) + thickness.powi(2));
-        for row in 0..lift.len() {
-            for column in 0..lift.len() {
-                mass[(row, column)] += segment.mass * lift[row] * lift[column] + inertia * turn[row] * turn[column];
-            }
-        }
-        left += segment.length;
-        pivots.push(left);
-    }
-    let joint_block = mass.view((2, 2), (joints, joints)).into_owned();
-    let reduced = if robot.mount == Mount::Clamped {
-        joint_block
-    } else {
-        let base = mass.view((0, 0), (2, 2)).into_owned();
-        let coupling = mass.view((0, 2), (2, joints)).into_owned();
-        match base.try_inverse() {
-            Some(inverse) => joint_block - coupling.transpose() * inverse * coupling,
-            None => joint_block,
-        }
-    };
-    // K is a multiple of the unit matrix: the largest ω² is k over the smallest eigenvalue of the mass matrix.
-    let smallest = reduced.symmetric_eigen().eigenvalues.min();
-    (robot.joint().stiffness / smallest).sqrt()
-}
-
-/// Largest time step (s) for which the torque law, evaluated at the start of each step, is stable.
-///
-/// A mode of frequency ω and damping rate c = ηω², stepped by semi-implicit Euler with explicit damping, has the characteristic
-/// polynomial λ² − (2 − hc − h²ω²)λ + (1 − hc). Its roots stay inside the unit circle while 4 − 2hc − h²ω² > 0:
-///
-/// ```text
-/// h < (√(c² + 4ω²) − c)/ω²        which tends to 2/(ηω²) for strong damping
-/// ```
-///
-/// Evaluated for the highest joint mode. Contact can require less.
-pub fn stable_step(robot: &Robot) -> f64 {
-    let omega = highest_joint_frequency(robot);
-    let c = robot.damping.time() * omega * omega;
-    // √(c² + 4ω²) − c without cancellation.
-    4.0 / ((c * c + 4.0 * omega * omega).sqrt() + c)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Damping, Extensions, Film, Friction, Material};
+    use crate::model::{Damping, Extensions, Film, Friction, Material, Mount};
 
-    fn robot(actuators: usize, motors: usize, mount: Mount, damping: f64) -> Robot {
+    pub(super) fn robot(actuators: usize, motors: usize, mount: Mount, damping: f64) -> Robot {
         Robot {
             material: Material::PARAMETER_2,
             actuators,
@@ -160,24 +99,5 @@ mod tests {
         assert!((f[2] / f[0] - (7.854757_f64 / 1.875104).powi(2)).abs() < 1e-4);
         // A wave of c = ω/λ with the beam's first λ has the beam's first frequency.
         assert!((phase_velocity(&robot, f[0]) / (2.0 * std::f64::consts::PI * f[0] / (1.875104 / 10.0)) - 1.0).abs() < 1e-5);
-    }
-
-    #[test]
-    fn one_joint_is_a_pendulum_on_a_spring() {
-        let robot = robot(1, 1, Mount::Clamped, 0.0);
-        // One box of half length and half mass behind the joint: I = M/2 (l²/3 + t²/12), l = L/2.
-        let mass = Laminate::new(&robot.material).actuator_mass / 2.0;
-        let inertia = mass * (25.0 / 3.0 + 0.01 / 12.0);
-        let omega = (robot.joint().stiffness / inertia).sqrt();
-        assert!((highest_joint_frequency(&robot) / omega - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_stable_step_has_its_limits_without_and_with_strong_damping() {
-        let free = robot(1, 3, Mount::Clamped, 0.0);
-        let omega = highest_joint_frequency(&free);
-        assert!((stable_step(&free) * omega - 2.0).abs() < 1e-12);
-        let damped = robot(1, 3, Mount::Clamped, 100.0);
-        assert!((stable_step(&damped) * damped.damping.time() * omega * omega - 2.0).abs() < 1e-3);
     }
 }

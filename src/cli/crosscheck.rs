@@ -190,8 +190,10 @@ fn check(item: Item, args: &Args) -> Result<Outcome, Failure> {
         }
         (None, None, None) => return Err(Failure::Usage("there is nothing to compare with".into())),
     };
-    let ours = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?.recording;
-    Ok(Outcome { name, against, report: compare(&ours, &theirs) })
+    let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
+    // Equal bits of a run that went wrong are equal bits.
+    run.trouble(&experiment).iter().for_each(|trouble| eprintln!("warning: {name}: {trouble}"));
+    Ok(Outcome { name, against, report: compare(&run.recording, &theirs) })
 }
 
 fn describe(outcome: &Outcome) -> String {

@@ -7,6 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde_json::{Value, json};
 
 use super::Failure;
+use crate::experiment::EngineKind;
 use crate::files::Pending;
 use crate::recording::{Recording, csv, npz};
 
@@ -100,6 +101,16 @@ pub fn manifest(experiment: &crate::experiment::Experiment, wall_s: f64, interru
         "experiment": experiment.config,
         "resolved_cgs": experiment.spec(),
         "step_choice": experiment.step_choice,
+        "velocities": match experiment.engine {
+            EngineKind::Bullet => json!({
+                "dataPositionVelocities": "as the reference: of the links' centres of mass, one step late; the left end's is its own",
+                "nodes_velocity": "of the nodes themselves at dataTime",
+            }),
+            EngineKind::Planar => json!({
+                "dataPositionVelocities": "of the nodes themselves at dataTime",
+                "nodes_velocity": "of the nodes themselves at dataTime",
+            }),
+        },
         "git_revision": env!("SFERS_GIT_REVISION"),
         "version": env!("CARGO_PKG_VERSION"),
         "bullet": format!("{} {}", env!("SFERS_BULLET_VERSION"), env!("SFERS_BULLET_PRECISION")),

@@ -1,5 +1,6 @@
 //! `sfers run`: simulate one experiment and print its measures.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,9 +11,8 @@ use serde_json::json;
 
 use super::output::{Output, finish, manifest, now, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print, say};
-use crate::analytic;
 use crate::engine::Engine;
-use crate::experiment::{self, Control, EngineKind, Experiment, Run, SavedState, Setting, Source};
+use crate::experiment::{self, Control, Experiment, Run, SavedState, Setting, Source};
 use crate::export;
 use crate::files;
 use crate::recording::measures::Measures;
@@ -33,7 +33,8 @@ pub struct Args {
     /// Take the bodies from a URDF: a chain of boxes with hinges about +y. `-` is standard input.
     #[arg(long, value_name = "FILE.urdf")]
     robot: Option<PathBuf>,
-    /// Save the recording: FILE.npz (the reference's keys, CGS) or FILE.csv (units in the header); `-` is CSV on standard output.
+    /// Save the recording: FILE.npz (the reference's keys, CGS; nodes_velocity holds the nodes' own velocities, which dataPositionVelocities
+    /// does not on Bullet) or FILE.csv (units in the header, the nodes' own velocities); `-` is CSV on standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Save the state at the end, for another run to go on from.
@@ -95,16 +96,15 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
 
     let mut warnings = Vec::new();
-    let stable = analytic::stable_step(&experiment.robot);
     if let Some(choice) = &experiment.step_choice {
         options.remark(&format!(
             "time step {:.3e} s: from twice that, the {} of the first {} s changes by {:.1e} (allowed {:.0e})",
             choice.time_step_s, choice.measure, choice.stretch_s, choice.change, choice.asked
         ));
     }
-    if experiment.engine == EngineKind::Bullet && experiment.time_step > stable {
-        warnings.push(format!("the time step {:e} s is above the largest stable one, {stable:.2e} s", experiment.time_step));
-        options.remark(&format!("warning: {}", warnings[0]));
+    // Said before the run, which may take long; the run itself says it again, with its measures left out.
+    if let Some(stable) = experiment::unstable(&experiment, 0.0) {
+        options.remark(&format!("warning: {}", experiment::step_too_long(experiment.time_step, stable)));
     }
     // The first Ctrl-C ends the run in good order; without a handler (a second one in this process) it ends at once.
     let _ = ctrlc::set_handler(|| INTERRUPT.store(true, Ordering::Relaxed));
@@ -112,8 +112,12 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let first_step = engine.step();
     let bar = progress(&experiment, options);
     let start = Instant::now();
+    let mut remaining = Remaining::new(&experiment, first_step);
     let result = experiment::run(&experiment, engine.as_mut(), |done| {
         bar.set_position(done);
+        if let Some(text) = remaining.after(done, start.elapsed().as_secs_f64()) {
+            bar.suspend(|| options.remark(&text));
+        }
         if INTERRUPT.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
     });
     let wall = start.elapsed().as_secs_f64();
@@ -124,6 +128,8 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         // Even when quiet: the result is not what was asked for.
         say(&format!("warning: {problem}; no measures are given"));
     }
+    let remarks = run.warnings(&experiment);
+    remarks.iter().for_each(|warning| say(&format!("warning: {warning}")));
     let Run { mut recording, interrupted, energy, audited, .. } = run;
     let steps = recording.meta.steps;
     if interrupted {
@@ -141,7 +147,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     } else {
         Measures::default()
     };
-    warnings.extend(trouble);
+    warnings.extend(trouble.into_iter().chain(remarks));
     let measures = Measures { energy_error: audited.then(|| energy.error()), ..measures };
     let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
@@ -205,6 +211,55 @@ fn load_state(path: &Path, experiment: &Experiment, engine: &mut dyn Engine) -> 
         )));
     }
     state.load_into(engine).map_err(|error| bad(error.to_string()))
+}
+
+/// First time at which the time left is told (s), and how much must be left for it.
+const TOLD_AFTER: f64 = 3.0;
+const WORTH_TELLING: f64 = 60.0;
+
+/// Tells how long a long run will take: once where stderr is a terminal with a bar, and otherwise again whenever the run has taken twice as long.
+struct Remaining {
+    joints: usize,
+    first: u64,
+    steps: u64,
+    next: f64,
+    repeats: bool,
+}
+
+impl Remaining {
+    fn new(experiment: &Experiment, first: u64) -> Self {
+        let repeats = !std::io::stderr().is_terminal();
+        Self { joints: experiment.robot.joints(), first, steps: experiment.steps, next: TOLD_AFTER, repeats }
+    }
+
+    /// What there is to say after `done` steps and so many seconds.
+    fn after(&mut self, done: u64, elapsed: f64) -> Option<String> {
+        if elapsed < self.next || done <= self.first {
+            return None;
+        }
+        self.next = if self.repeats { 2.0 * elapsed } else { f64::INFINITY };
+        let rate = (done - self.first) as f64 / elapsed;
+        let left = (self.steps - done) as f64 / rate;
+        (left > WORTH_TELLING).then(|| {
+            format!(
+                "{done} of {} steps of {} joints done, {rate:.0} steps/s: about {} left; Ctrl-C ends the run and keeps what is recorded",
+                self.steps,
+                self.joints,
+                spoken(left)
+            )
+        })
+    }
+}
+
+/// A time (s) in its largest unit.
+fn spoken(seconds: f64) -> String {
+    let (value, unit) = match seconds {
+        s if s < 120.0 => (s, "s"),
+        s if s < 7200.0 => (s / 60.0, "min"),
+        s if s < 172_800.0 => (s / 3600.0, "h"),
+        s => (s / 86400.0, "days"),
+    };
+    format!("{value:.0} {unit}")
 }
 
 /// A bar on stderr; indicatif hides it where stderr is no terminal.

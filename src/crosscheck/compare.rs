@@ -153,6 +153,7 @@ mod tests {
             motor_voltages: vec![0.0; 6],
             positions: vec![0.0; 36],
             velocities: vec![0.0; 36],
+            node_velocities: Vec::new(),
         }
     }
 

@@ -390,10 +390,12 @@ type RunData = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>, Vec<String>);
 fn read_run(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<RunData, DataError> {
     let bytes =
         crate::files::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
-    parse_run(&bytes, robot.actuators, markers).map_err(|Wrong { line, column, reason }| match line {
-        0 => DataError::Unreadable { path: path.into(), reason },
-        _ => DataError::Content { path: path.into(), line, column, reason },
-    })
+    parse_run(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage)).map_err(
+        |Wrong { line, column, reason }| match line {
+            0 => DataError::Unreadable { path: path.into(), reason },
+            _ => DataError::Content { path: path.into(), line, column, reason },
+        },
+    )
 }
 
 #[derive(Debug)]
@@ -403,7 +405,12 @@ struct Wrong {
     reason: String,
 }
 
-fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunData, Wrong> {
+fn parse_run(
+    bytes: &[u8],
+    actuators: usize,
+    markers: &[Marker],
+    bears: impl Fn(f64) -> Result<(), String>,
+) -> Result<RunData, Wrong> {
     let wrong = |line: u64, column: usize, reason: String| Wrong { line, column, reason };
     if bytes.is_empty() {
         return Err(wrong(0, 0, "is empty".into()));
@@ -484,7 +491,10 @@ fn parse_run(bytes: &[u8], actuators: usize, markers: &[Marker]) -> Result<RunDa
         }
         times.push(time);
         for &column in &volt_columns {
-            voltages.push(within(column, MOST_VOLTS, "V")?);
+            let voltage = within(column, MOST_VOLTS, "V")?;
+            bears(voltage)
+                .map_err(|reason| wrong(line, column + 1, format!("{} {reason}", headers.get(column).unwrap_or_default())))?;
+            voltages.push(voltage);
         }
         for (channel, column) in channels.iter_mut().zip(&columns) {
             if let Some(column) = *column {
@@ -529,7 +539,7 @@ mod tests {
     #[test]
     fn columns_may_stand_in_any_order_and_cells_may_be_empty() {
         let text = b"tip_z_mm, v1_v, t_s\n1.5, 10, 0\n, 20, 0.1\n";
-        let (times, voltages, channels, remarks) = parse_run(text, 1, &markers()).unwrap();
+        let (times, voltages, channels, remarks) = parse_run(text, 1, &markers(), |_| Ok(())).unwrap();
         assert_eq!((times, voltages), (vec![0.0, 0.1], vec![10.0, 20.0]));
         assert!(channels[0].is_empty() && channels[1][0] == 1.5 && channels[1][1].is_nan());
         assert_eq!(remarks.len(), 1);
@@ -550,7 +560,7 @@ mod tests {
             ("t_s,v1_v\n0,1\n", 1, 0, "no column of a marker"),
             ("t_s,v1_v,tip_z_mm\n0,1\n", 2, 0, "fields"),
         ] {
-            let error = parse_run(text.as_bytes(), 1, &markers()).unwrap_err();
+            let error = parse_run(text.as_bytes(), 1, &markers(), |_| Ok(())).unwrap_err();
             assert!(error.reason.contains(words) && (error.line, error.column) == (line, column), "{text:?}: {error:?}");
         }
     }
@@ -560,7 +570,7 @@ mod tests {
         fn any_bytes_are_a_run_or_an_error_but_never_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), head in any::<bool>()) {
             let mut text = if head { b"t_s,v1_v,tip_z_mm\n".to_vec() } else { Vec::new() };
             text.extend(bytes);
-            let _ = parse_run(&text, 1, &markers());
+            let _ = parse_run(&text, 1, &markers(), |_| Ok(()));
         }
     }
 }

@@ -20,7 +20,12 @@ pub trait Voltages: Send {
         Vec::new()
     }
 
-    /// Takes up a memory of the same length.
+    /// How many numbers at the beginning of `saved` are a memory of its; none if they cannot be.
+    fn held(&self, saved: &[f64]) -> Option<usize> {
+        Some(self.memory().len()).filter(|len| *len <= saved.len())
+    }
+
+    /// Takes up a memory that [`held`](Self::held) has found.
     fn remember(&mut self, _memory: &[f64]) {}
 }
 
@@ -66,15 +71,15 @@ impl Path {
         self.stages.iter().flat_map(|stage| stage.memory()).collect()
     }
 
-    /// How many numbers that are.
-    pub fn len(&self) -> usize {
-        self.stages.iter().map(|stage| stage.memory().len()).sum()
+    /// How many numbers at the beginning of `saved` are a memory of this path; none if they cannot be.
+    pub fn held(&self, saved: &[f64]) -> Option<usize> {
+        self.stages.iter().try_fold(0, |held, stage| Some(held + stage.held(&saved[held..])?))
     }
 
-    /// Takes that many numbers up again.
+    /// Takes those numbers up again.
     pub fn load(&mut self, mut saved: &[f64]) {
         for stage in &mut self.stages {
-            let (own, rest) = saved.split_at(stage.memory().len());
+            let Some((own, rest)) = stage.held(saved).and_then(|held| saved.split_at_checked(held)) else { return };
             stage.remember(own);
             saved = rest;
         }

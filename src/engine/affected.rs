@@ -1,6 +1,6 @@
 //! An engine whose voltages pass effects on their way to the actuators.
 
-use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase, Unsettled};
 use crate::effects::Path;
 
 /// Any engine behind a [`Path`].
@@ -23,6 +23,7 @@ impl AffectedEngine {
 impl Engine for AffectedEngine {
     /// The voltages pass once for every step, so this may be called once before every [`advance`](Engine::advance).
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        EngineError::unless_voltages(voltages.len(), self.actuators())?;
         self.voltages.clear();
         self.voltages.extend_from_slice(voltages);
         self.path.pass(self.time_step, &mut self.voltages);
@@ -56,6 +57,10 @@ impl Engine for AffectedEngine {
         self.engine.nodes(positions, velocities)
     }
 
+    fn correct_velocities(&mut self, velocities: &mut [f64]) -> Result<(), EngineError> {
+        self.engine.correct_velocities(velocities)
+    }
+
     fn base(&mut self) -> Result<PlanarBase, EngineError> {
         self.engine.base()
     }
@@ -80,7 +85,8 @@ impl Engine for AffectedEngine {
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
-        let (memory, rest) = state.split_at_checked(self.path.len()).ok_or(EngineError::State)?;
+        let held = self.path.held(state).ok_or(EngineError::State)?;
+        let (memory, rest) = state.split_at(held);
         self.engine.load(step, rest)?;
         self.path.load(memory);
         Ok(())
@@ -102,8 +108,20 @@ impl Engine for AffectedEngine {
         self.engine.gravitational_energy()
     }
 
+    fn actuators(&self) -> usize {
+        self.engine.actuators()
+    }
+
+    fn unsettled(&self) -> Option<Unsettled> {
+        self.engine.unsettled()
+    }
+
     fn step(&self) -> u64 {
         self.engine.step()
+    }
+
+    fn hardening_curvature(&self) -> f64 {
+        self.engine.hardening_curvature()
     }
 
     fn clamp_hits(&self) -> Option<ClampHits> {

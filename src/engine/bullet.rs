@@ -44,7 +44,8 @@ pub struct BulletEngine {
     motors_per_actuator: usize,
     lengths: Vec<f64>,
     time_step: f64,
-    stable_step: f64,
+    /// For messages.
+    robot: Robot,
     step: u64,
     state: JointState,
     links: Vec<LinkState>,
@@ -65,7 +66,7 @@ impl BulletEngine {
     /// Builds `robot`, at rest and flat, to be stepped by `time_step` (s).
     ///
     /// # Errors
-    /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::Bullet`] if Bullet refuses.
+    /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::TimeStep`], [`EngineError::Bullet`] if Bullet refuses.
     pub fn new(robot: &Robot, time_step: f64) -> Result<Self, EngineError> {
         Self::with_settings(robot, time_step, &SolverSettings::pybullet(robot.material.gravity))
     }
@@ -76,6 +77,7 @@ impl BulletEngine {
     /// As [`new`](Self::new).
     pub fn with_settings(robot: &Robot, time_step: f64, settings: &SolverSettings) -> Result<Self, EngineError> {
         robot.check()?;
+        EngineError::unless_step(time_step)?;
         let extensions = &robot.extensions;
         let mut world = World::new(settings)?;
         if extensions.slope != 0.0 {
@@ -115,7 +117,7 @@ impl BulletEngine {
             motors_per_actuator: robot.motors_per_actuator,
             lengths: segments.iter().map(|segment| segment.length).collect(),
             time_step,
-            stable_step: analytic::stable_step(robot),
+            robot: robot.clone(),
             step: 0,
             state: JointState { angles: zeros(), rates: zeros(), torques: zeros(), motor_voltages: zeros() },
             links: Vec::with_capacity(joints),
@@ -189,7 +191,7 @@ impl BulletEngine {
 
     fn not_finite(&self, what: String, value: f64) -> EngineError {
         let time = self.step as f64 * self.time_step;
-        EngineError::NotFinite { what, value, step: self.step, time, stable_step: self.stable_step }
+        EngineError::NotFinite { what, value, step: self.step, time, stable_step: Some(analytic::stable_step(&self.robot)) }
     }
 
     /// The first joint whose angle or rate is not a number. Kept out of the loop: it runs once per failure.
@@ -216,6 +218,8 @@ struct Beyond {
     gains: Vec<f64>,
     /// q_j of the loss ladder of each joint (rad).
     loss: Vec<[f64; LOSS_TIMES.len()]>,
+    /// Largest elastic angle so far (rad), if joints harden with it.
+    largest: f64,
 }
 
 impl Beyond {
@@ -231,15 +235,19 @@ impl Beyond {
             rest_angles: (0..joints).map(of_joint).collect(),
             gains: (0..joints).map(|i| e.joint_gains.get(i).copied().unwrap_or(1.0)).collect(),
             loss: if e.loss == 0.0 { Vec::new() } else { vec![[0.0; LOSS_TIMES.len()]; joints] },
+            largest: 0.0,
             extensions: e.clone(),
         })
     }
 
     /// Torque of joint `i` (dyn·cm); its voltage becomes the one that acts.
-    fn torque(&self, i: usize, joint: &PiezoJoint, angle: f64, rate: f64, voltage: &mut f64) -> f64 {
+    fn torque(&mut self, i: usize, joint: &PiezoJoint, angle: f64, rate: f64, voltage: &mut f64) -> f64 {
         *voltage *= self.gains[i];
         let angle = angle - self.rest_angles[i];
         let delta = angle - joint.rest_angle_per_volt * *voltage;
+        if self.extensions.softening < 0.0 {
+            self.largest = self.largest.max(delta.abs());
+        }
         let stored: f64 = self.loss.get(i).map_or(0.0, |ladder| ladder.iter().sum());
         joint.torque(angle, rate, *voltage) + self.extensions.torque(joint.stiffness, self.link, delta, rate)
             - joint.stiffness * self.extensions.loss * stored
@@ -321,8 +329,9 @@ fn base_pitch(base: &BaseState) -> f64 {
 
 impl Engine for BulletEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        EngineError::unless_voltages(voltages.len(), self.robot.actuators)?;
         let JointState { angles, rates, torques, motor_voltages } = &mut self.state;
-        let beyond = self.beyond.as_ref();
+        let mut beyond = self.beyond.as_mut();
         self.world.joint_states(self.body, angles, rates)?;
         let m = self.motors_per_actuator as f64;
         let mut sum = 0.0;
@@ -331,7 +340,7 @@ impl Engine for BulletEngine {
             let joints = actuator * self.motors_per_actuator..(actuator + 1) * self.motors_per_actuator;
             for i in joints {
                 motor_voltages[i] = motor_voltage;
-                torques[i] = match beyond {
+                torques[i] = match &mut beyond {
                     None => self.joint.torque(angles[i], rates[i], motor_voltage),
                     Some(beyond) => beyond.torque(i, &self.joint, angles[i], rates[i], &mut motor_voltages[i]),
                 };
@@ -387,6 +396,25 @@ impl Engine for BulletEngine {
             0.0,
             last.velocity[2] - length * p.cos() * rate,
         ]);
+        Ok(())
+    }
+
+    /// From the base's motion and the joints' angles and rates, which are all of the same time, by the chain's geometry in its plane.
+    fn correct_velocities(&mut self, velocities: &mut [f64]) -> Result<(), EngineError> {
+        let PlanarBase { mut pitch, pitch_rate: mut rate, velocity: [x, z], .. } = self.base()?;
+        let lever = |length: f64, pitch: f64, rate: f64| [-length * pitch.sin() * rate, -length * pitch.cos() * rate];
+        let [lever_x, lever_z] = lever(-0.5 * self.lengths[0], pitch, rate);
+        let mut velocity = [x + lever_x, z + lever_z];
+        for (i, node) in velocities.chunks_exact_mut(3).enumerate() {
+            if i > 0 {
+                let [lever_x, lever_z] = lever(self.lengths[i - 1], pitch, rate);
+                velocity = [velocity[0] + lever_x, velocity[1] + lever_z];
+                // Behind a joint. The right end has none.
+                pitch += self.state.angles.get(i - 1).unwrap_or(&0.0);
+                rate += self.state.rates.get(i - 1).unwrap_or(&0.0);
+            }
+            node.copy_from_slice(&[velocity[0], 0.0, velocity[1]]);
+        }
         Ok(())
     }
 
@@ -454,8 +482,16 @@ impl Engine for BulletEngine {
         Ok(())
     }
 
+    fn actuators(&self) -> usize {
+        self.robot.actuators
+    }
+
     fn step(&self) -> u64 {
         self.step
+    }
+
+    fn hardening_curvature(&self) -> f64 {
+        self.beyond.as_ref().map_or(0.0, |beyond| beyond.largest / beyond.link)
     }
 
     fn clamp_hits(&self) -> Option<ClampHits> {

@@ -50,6 +50,20 @@ pub enum EngineError {
         /// The longest (s).
         longest: f64,
     },
+    /// A time step that is no step.
+    #[error("the time step is {time_step} s, but must be a positive number")]
+    TimeStep {
+        /// The step (s).
+        time_step: f64,
+    },
+    /// Not one voltage per actuator.
+    #[error("{given} voltages for a robot of {needed} actuators")]
+    Voltages {
+        /// How many there are.
+        given: usize,
+        /// How many there must be.
+        needed: usize,
+    },
     /// A robot that comes to rest nowhere.
     #[error("there is no equilibrium to start from: {reason}")]
     NoEquilibrium {
@@ -60,7 +74,7 @@ pub enum EngineError {
     #[error("the state does not fit this robot")]
     State,
     /// A coordinate is no longer a number.
-    #[error("the simulation diverged: {what} is {value} at step {step}, t = {time} s; try a time step below {stable_step:.3e} s")]
+    #[error("the simulation diverged: {what} is {value} at step {step}, t = {time} s; try {}", shorter(*.stable_step))]
     NotFinite {
         /// The coordinate: a joint with its number, or the base.
         what: String,
@@ -70,9 +84,24 @@ pub enum EngineError {
         step: u64,
         /// The time of the step (s).
         time: f64,
-        /// The largest step for which the explicit torque law is stable (s).
-        stable_step: f64,
+        /// The largest step for which the explicit torque law is stable (s), of an engine that has it.
+        stable_step: Option<f64>,
     },
+}
+
+impl EngineError {
+    fn unless_step(time_step: f64) -> Result<(), Self> {
+        if time_step.is_finite() && time_step > 0.0 { Ok(()) } else { Err(Self::TimeStep { time_step }) }
+    }
+
+    fn unless_voltages(given: usize, needed: usize) -> Result<(), Self> {
+        if given == needed { Ok(()) } else { Err(Self::Voltages { given, needed }) }
+    }
+}
+
+/// What to try where a simulation diverged.
+fn shorter(stable_step: Option<f64>) -> String {
+    stable_step.map_or_else(|| "a smaller time step".into(), |step| format!("a time step below {step:.3e} s"))
 }
 
 /// The joints at the start of a step.
@@ -115,6 +144,24 @@ pub struct ClampHits {
     pub limit: f64,
 }
 
+/// Steps whose friction is not Coulomb's to the tolerance of the fixed-point iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unsettled {
+    /// How many.
+    pub steps: u64,
+    /// The first of them, counting from 0.
+    pub first_step: u64,
+    /// The last.
+    pub last_step: u64,
+    /// Largest change of a lift that was left (cm/s), the tolerance being [`Unsettled::TOLERANCE`].
+    pub largest: f64,
+}
+
+impl Unsettled {
+    /// Change of a lift at which the iteration is done (cm/s).
+    pub const TOLERANCE: f64 = planar::LIFT_ENOUGH;
+}
+
 /// A force of the floor on a link during the last step, in the plane of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
@@ -131,7 +178,7 @@ pub trait Engine {
     /// Takes the voltages of the coming step (V), one per actuator.
     ///
     /// # Errors
-    /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number.
+    /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number, [`EngineError::Voltages`] for too many or too few.
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError>;
 
     /// Into how many equal parts of a step the voltages are better given, where they may jump within it: see [`prepare_parts`](Self::prepare_parts).
@@ -150,11 +197,21 @@ pub trait Engine {
     /// The joints between [`prepare`](Self::prepare) and [`advance`](Self::advance), with the torques of the coming step.
     fn joints(&mut self) -> &JointState;
 
-    /// Positions (cm) and velocities (cm/s) of the nodes, N·m + 2 times x, y, z: the left end, each joint, the right end.
+    /// Positions (cm) and velocities (cm/s) of the nodes, N·m + 2 times x, y, z: the left end, each joint, the right end. On Bullet as the
+    /// reference records them, see [`Recording::velocities`](crate::recording::Recording::velocities).
     ///
     /// # Errors
     /// [`EngineError::NotFinite`] if the base's position is not a number.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError>;
+
+    /// Turns the velocities that [`nodes`](Self::nodes) gave into those of the nodes themselves (cm/s) between
+    /// [`prepare`](Self::prepare) and [`advance`](Self::advance).
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn correct_velocities(&mut self, _velocities: &mut [f64]) -> Result<(), EngineError> {
+        Ok(())
+    }
 
     /// Pose and velocity of the base in the plane of motion.
     ///
@@ -213,8 +270,21 @@ pub trait Engine {
         None
     }
 
+    /// Number of actuators.
+    fn actuators(&self) -> usize;
+
+    /// Whether, when and how often the iteration for Coulomb's friction ended without a solution.
+    fn unsettled(&self) -> Option<Unsettled> {
+        None
+    }
+
     /// Number of steps taken.
     fn step(&self) -> u64;
+
+    /// Largest elastic curvature of a joint so far (1/cm), of an explicit engine whose joints harden with it; otherwise 0.
+    fn hardening_curvature(&self) -> f64 {
+        0.0
+    }
 
     /// Whether, when and how often the engine limited a velocity.
     fn clamp_hits(&self) -> Option<ClampHits>;

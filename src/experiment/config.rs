@@ -115,6 +115,8 @@ pub struct MaterialConfig {
     pub adhesive_modulus_gpa: Option<f64>,
     pub adhesive_thickness_um: Option<f64>,
     pub adhesive_density_g_cm3: Option<f64>,
+    pub max_field_kv_mm: Option<f64>,
+    pub max_strain: Option<f64>,
 }
 
 /// `[robot]`.

@@ -4,17 +4,19 @@ use std::path::Path;
 
 use super::config::ConfigError;
 use crate::drive::Table;
+use crate::model::Robot;
 
-/// Reads the table for a robot of `actuators` actuators. Columns may stand in any order; others are ignored.
+/// Reads the table for a robot, whose material must bear the voltages. Columns may stand in any order; others are ignored.
 ///
 /// # Errors
-/// [`ConfigError::Data`] names the file and the line: a missing column, a cell that is no number, times that do not rise.
-pub fn read(path: &Path, actuators: usize) -> Result<Table, ConfigError> {
+/// [`ConfigError::Data`] names the file and the line: a missing column, a cell that is no number or too high a voltage, times that do not rise.
+pub fn read(path: &Path, robot: &Robot) -> Result<Table, ConfigError> {
     let bytes = crate::files::read(path).map_err(|error| ConfigError::Data { path: path.into(), reason: error.to_string() })?;
-    parse(&bytes, actuators).map_err(|reason| ConfigError::Data { path: path.into(), reason })
+    parse(&bytes, robot.actuators, |voltage| robot.check_voltage(voltage))
+        .map_err(|reason| ConfigError::Data { path: path.into(), reason })
 }
 
-fn parse(bytes: &[u8], actuators: usize) -> Result<Table, String> {
+fn parse(bytes: &[u8], actuators: usize, bears: impl Fn(f64) -> Result<(), String>) -> Result<Table, String> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
     let headers = reader.headers().map_err(|error| error.to_string())?.clone();
     let column = |name: &str| {
@@ -34,7 +36,13 @@ fn parse(bytes: &[u8], actuators: usize) -> Result<Table, String> {
         };
         times.push(number(time_column)?);
         for &column in &voltage_columns {
-            voltages.push(number(column)?);
+            let voltage = number(column)?;
+            // What is not finite is said with the table.
+            if voltage.is_finite() {
+                bears(voltage)
+                    .map_err(|reason| format!("line {line}: column {}: {reason}", headers.get(column).unwrap_or_default()))?;
+            }
+            voltages.push(voltage);
         }
         lines.push(line);
     }
@@ -52,7 +60,7 @@ mod tests {
 
     #[test]
     fn columns_may_stand_in_any_order_beside_others() {
-        let table = parse(b"note, v2_v, t_s, v1_v\nx, 2, 0, 1\ny, 4, 0.5, 3\n", 2).unwrap();
+        let table = parse(b"note, v2_v, t_s, v1_v\nx, 2, 0, 1\ny, 4, 0.5, 3\n", 2, |_| Ok(())).unwrap();
         assert_eq!(table.times(), [0.0, 0.5]);
         assert_eq!(table.row(1), [3.0, 4.0]);
     }
@@ -68,7 +76,7 @@ mod tests {
             ("t_s,v1_v,v2_v\n0,1\n", "line: 2"),
             ("t_s,v1_v,v2_v\n", "no rows"),
         ] {
-            let error = parse(text.as_bytes(), 2).unwrap_err();
+            let error = parse(text.as_bytes(), 2, |_| Ok(())).unwrap_err();
             assert!(error.contains(words), "{text:?}: {error}");
         }
     }
@@ -78,7 +86,7 @@ mod tests {
         fn any_bytes_are_a_table_or_an_error_but_never_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), head in any::<bool>()) {
             let mut text = if head { b"t_s,v1_v\n".to_vec() } else { Vec::new() };
             text.extend(bytes);
-            let _ = parse(&text, 1);
+            let _ = parse(&text, 1, |_| Ok(()));
         }
 
         #[test]
@@ -89,7 +97,7 @@ mod tests {
             for (t, v) in &rows {
                 text += &format!("{t},{v}\n");
             }
-            let table = parse(text.as_bytes(), 1).unwrap();
+            let table = parse(text.as_bytes(), 1, |_| Ok(())).unwrap();
             for (i, (t, v)) in rows.iter().enumerate() {
                 prop_assert_eq!((table.times()[i], table.row(i)[0]), (*t, *v));
             }

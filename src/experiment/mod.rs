@@ -4,6 +4,7 @@ mod auto;
 mod config;
 mod drive_csv;
 pub mod presets;
+mod range;
 mod resolve;
 mod run;
 mod spec;
@@ -17,6 +18,8 @@ pub use config::{
     Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, Setting,
     SimulationConfig, Source, StepConfig,
 };
+pub use range::Bending;
+pub(crate) use range::{step_too_long, unstable};
 pub use resolve::{check, experiment};
 pub(crate) use run::hermite;
 pub use run::{Control, Run, run};

@@ -8,13 +8,17 @@ use crate::drive::gait::{self, Parameter};
 use crate::drive::{Drive, Waveform};
 use crate::effects::{self, Applied, EffectError};
 use crate::engine::FrictionModel;
-use crate::model::units::{ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2};
+use crate::model::units::{
+    ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2, v_per_cm_from_kv_per_mm,
+};
 use crate::model::{Damping, Extensions, Film, Friction, Material, ModelError, Mount, Robot};
 use crate::recording::MAX_VALUES;
 use crate::words::{not_one_of, number};
 
 /// The reference's `dampingEta` where a file gives no damping.
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
+/// Most steps of a run: up to here times are whole multiples of the step to a part in ten.
+const MAX_STEPS: f64 = 1e15;
 const DEFAULT_ON_VOLTAGES: [f64; 5] = [520.0, 520.0, -1500.0, 520.0, 520.0];
 
 /// What may go wrong on the way: a value, or a file that a value names.
@@ -158,7 +162,7 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
     )?;
     let same = |value: f64| value;
     type Override<'a> = (&'a mut f64, Option<f64>, fn(f64) -> f64);
-    let overrides: [Override; 16] = [
+    let overrides: [Override; 18] = [
         (&mut material.actuator_length, m.actuator_length_mm, cm_from_mm),
         (&mut material.width, m.width_mm, cm_from_mm),
         (&mut material.gravity, m.gravity_m_s2, cm_s2_from_m_s2),
@@ -175,6 +179,8 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
         (&mut material.adhesive_modulus, m.adhesive_modulus_gpa, ba_from_gpa),
         (&mut material.adhesive_thickness, m.adhesive_thickness_um, cm_from_um),
         (&mut material.adhesive_density, m.adhesive_density_g_cm3, same),
+        (&mut material.max_field, m.max_field_kv_mm, v_per_cm_from_kv_per_mm),
+        (&mut material.max_strain, m.max_strain, same),
     ];
     for (slot, value, convert) in overrides {
         if let Some(value) = value {
@@ -231,12 +237,12 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
     }
     let in_steps = |key: &str, seconds: f64| {
         let steps = (positive(key, seconds)? / time_step).round();
-        if (1.0..=1e15).contains(&steps) {
+        if (1.0..=MAX_STEPS).contains(&steps) {
             Ok(steps as u64)
         } else {
             Err(Fault::new(
                 key,
-                format!("is {} time steps of {} s; between 1 and 1e15 are possible", number(steps), number(time_step)),
+                format!("is {} time steps of {} s; between 1 and {MAX_STEPS:e} are possible", number(steps), number(time_step)),
             ))
         }
     };
@@ -246,6 +252,9 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
         }
         (None, None) => return Err(Fault::new("simulation.duration_s", "is missing; give duration_s or steps")),
         (Some(0), None) => return Err(Fault::new("simulation.steps", "is 0, but at least one step is needed")),
+        (Some(steps), None) if steps as f64 > MAX_STEPS => {
+            return Err(Fault::new("simulation.steps", format!("is {steps}; between 1 and {MAX_STEPS:e} are possible")));
+        }
         (Some(steps), None) => steps,
         (None, Some(duration)) => in_steps("simulation.duration_s", duration)?,
     };
@@ -261,7 +270,7 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
     if record_every == 0 || record_every > steps {
         return Err(Fault::new(record_key, format!("is {record_every} steps, but the run has {steps}")));
     }
-    let values = (steps / record_every + 2) as f64 * (10.0 * robot.joints() as f64 + 13.0);
+    let values = (steps / record_every + 2) as f64 * (13.0 * robot.joints() as f64 + 19.0);
     if values > MAX_VALUES {
         let least = (record_every as f64 * values / MAX_VALUES).ceil();
         return Err(Fault::new(
@@ -318,12 +327,18 @@ fn positive(key: &str, value: f64) -> Result<f64, Fault> {
     }
 }
 
-/// Checks that there is one finite voltage per actuator.
+/// Checks that a voltage is a number that the material bears.
+fn voltage(key: &str, value: f64, robot: &Robot) -> Result<f64, Fault> {
+    robot.check_voltage(finite(key, value)?).map_err(|reason| Fault::new(key, reason))?;
+    Ok(value)
+}
+
+/// Checks that there is one voltage per actuator, and each of them.
 fn voltages(key: &str, values: &[f64], robot: &Robot) -> Result<Vec<f64>, Fault> {
     if values.len() != robot.actuators {
         return Err(Fault::new(key, format!("has {} values for {} actuators", values.len(), robot.actuators)));
     }
-    values.iter().try_for_each(|&value| finite(key, value).map(drop))?;
+    values.iter().try_for_each(|&value| voltage(key, value, robot).map(drop))?;
     Ok(values.to_vec())
 }
 
@@ -351,7 +366,7 @@ fn waveform(d: &DriveConfig, robot: &Robot, first: f64, folder: &Path) -> Result
                 (Some(_), Some(_)) => {
                     return Err(Fault::new("drive.amplitudes_v", "amplitude_v is given as well; keep one of the two").into());
                 }
-                (Some(amplitude), None) => vec![finite("drive.amplitude_v", amplitude)?; robot.actuators],
+                (Some(amplitude), None) => vec![voltage("drive.amplitude_v", amplitude, robot)?; robot.actuators],
                 (None, Some(amplitudes)) => voltages("drive.amplitudes_v", amplitudes, robot)?,
                 (None, None) => return Err(Fault::new("drive.amplitude_v", "is missing").into()),
             };
@@ -369,7 +384,7 @@ fn waveform(d: &DriveConfig, robot: &Robot, first: f64, folder: &Path) -> Result
         "csv" => {
             only(d, &own, &["file"])?;
             let path = folder.join(needed("drive.file", d.file.as_ref())?);
-            Waveform::Table(drive_csv::read(&path, robot.actuators).map_err(Trouble::Config)?)
+            Waveform::Table(drive_csv::read(&path, robot).map_err(Trouble::Config)?)
         }
         other => {
             let waveforms = ["gait", "dc", "sine", "step", "sequence", "csv"];
@@ -424,7 +439,9 @@ fn sequence(d: &DriveConfig, robot: &Robot) -> Result<Waveform, Fault> {
     }
     let on_voltages = match &d.on_voltages_v {
         Some(values) => Some(voltages("drive.on_voltages_v", values, robot)?),
-        None if robot.actuators == DEFAULT_ON_VOLTAGES.len() => Some(DEFAULT_ON_VOLTAGES.to_vec()),
+        None if robot.actuators == DEFAULT_ON_VOLTAGES.len() && phases.iter().any(|phase| phase.on.is_some()) => {
+            Some(voltages("drive.on_voltages_v", &DEFAULT_ON_VOLTAGES, robot)?)
+        }
         None => None,
     };
     let mut last = 0.0;

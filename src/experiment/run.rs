@@ -1,13 +1,19 @@
 //! The loop over steps.
 
 use super::Experiment;
+use super::range::{self, Bending, CLEARLY, UNSETTLED_TROUBLE};
 use crate::drive::{Means, Waveform};
 use crate::effects::View;
-use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
+use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError, Unsettled};
 use crate::recording::Recording;
 
 /// Steps between two calls of the observer: often enough for a progress bar, too rare to cost anything.
 const OBSERVE_EVERY: u64 = 256;
+/// The same in steps times joints, so that a step of a long chain is not waited for too often.
+const OBSERVE_EVERY_JOINTS: u64 = 1 << 14;
+/// Steps between two readings of the joint angles for [`Bending`], of an engine that computes them on demand: 6 ms of steps of 0.1 ms. On Bullet,
+/// which reads them anyway, every step counts, and on both every record.
+const BEND_EVERY_MIDPOINT: u64 = 64;
 
 /// What the observer of a run decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +33,12 @@ pub struct Run {
     pub interrupted: bool,
     /// Whether the engine had to limit velocities.
     pub clamp_hits: Option<ClampHits>,
+    /// The largest stable time step (s), if the engine is explicit and its step was longer.
+    pub unstable: Option<f64>,
+    /// Whether friction was not always solved for to its tolerance.
+    pub unsettled: Option<Unsettled>,
+    /// The most that a joint was bent.
+    pub bending: Bending,
     /// Where energy came from and where it went.
     pub energy: EnergyBalance,
     /// Whether the books of energy were kept: they know the plain model only.
@@ -36,6 +48,7 @@ pub struct Run {
 impl Run {
     /// What went wrong without stopping the run; measures of such a run would be those of another robot.
     pub fn trouble(&self, experiment: &Experiment) -> Vec<String> {
+        let unstable = self.unstable.map(|stable| range::step_too_long(experiment.time_step, stable));
         let clamp = self.clamp_hits.map(|hits| {
             format!(
                 "Bullet limited a velocity to {} (cm/s or rad/s) after {} steps, first at step {}, t = {:.6} s: from there on the \
@@ -55,11 +68,23 @@ impl Run {
                 fault.time_s
             )
         });
-        clamp.into_iter().chain(energy).collect()
+        let bending = self.bending.beyond(&experiment.robot, CLEARLY);
+        let unsettled =
+            self.unsettled.filter(|left| left.largest > UNSETTLED_TROUBLE).map(|left| range::unsettled(left, experiment));
+        unstable.into_iter().chain(clamp).chain(bending).chain(unsettled).chain(energy).collect()
+    }
+
+    /// What is to be known of measures that are given: nothing that [`trouble`](Self::trouble) says.
+    pub fn warnings(&self, experiment: &Experiment) -> Vec<String> {
+        let bending = |times| self.bending.beyond(&experiment.robot, times);
+        let bending = if bending(CLEARLY).is_none() { bending(1.0) } else { None };
+        let unsettled =
+            self.unsettled.filter(|left| left.largest <= UNSETTLED_TROUBLE).map(|left| range::unsettled(left, experiment));
+        bending.into_iter().chain(unsettled).collect()
     }
 }
 
-/// Runs an experiment on an engine of its robot, from the engine's step on. `observe` is called every 256 steps with the number of steps done.
+/// Runs an experiment on an engine of its robot, from the engine's step on. `observe` is called every 256 steps, or more often for more than 64 joints, with the number of steps done.
 ///
 /// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time
 /// is step · dt; joints are read and torques computed; the state before the step is recorded if its turn has come; the torques are
@@ -80,12 +105,15 @@ pub fn run(
     // A smooth drive needs no parts.
     let parts = if matches!(experiment.drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
     let mut pieces = vec![0.0; parts * experiment.robot.actuators];
+    let observe_every = (OBSERVE_EVERY_JOINTS / experiment.robot.joints().max(1) as u64).clamp(1, OBSERVE_EVERY);
+    let bend_every = if midpoint { BEND_EVERY_MIDPOINT } else { 1 };
+    let mut bending = Bending::default();
     let mut interrupted = false;
     let mut done = engine.step();
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
     let mut means = Means::new(&experiment.drive, experiment.robot.actuators, done as f64 * experiment.time_step);
     while done < experiment.steps {
-        if done.is_multiple_of(OBSERVE_EVERY) && observe(done) == Control::Stop {
+        if done.is_multiple_of(observe_every) && observe(done) == Control::Stop {
             interrupted = true;
             break;
         }
@@ -110,6 +138,9 @@ pub fn run(
         }
         if experiment.records(done) {
             recorder.record(time, engine)?;
+            bending.take(recorder.last_angles(), time);
+        } else if done.is_multiple_of(bend_every) {
+            bending.take(&engine.joints().angles, time);
         }
         engine.advance()?;
         done += 1;
@@ -122,7 +153,10 @@ pub fn run(
         recording,
         interrupted,
         clamp_hits: engine.clamp_hits(),
+        unstable: range::unstable(experiment, engine.hardening_curvature()),
         audited: energy.is_some(),
+        unsettled: engine.unsettled(),
+        bending,
         energy: energy.unwrap_or_default(),
     })
 }
@@ -137,7 +171,7 @@ fn see(recording: &mut Recording, view: &View, origin: f64) {
     let origin = if view.scale == 1.0 && view.tilt == 0.0 { 0.0 } else { origin };
     let width = 3 * recording.nodes();
     let late = |row: usize, column: usize| {
-        let (p, v) = (&recording.positions, &recording.velocities);
+        let (p, v) = (&recording.positions, &recording.node_velocities);
         if view.delay == 0.0 {
             return p[row * width + column];
         }
@@ -189,8 +223,15 @@ impl Recorder {
             motor_voltages: of(joints),
             positions: of(3 * nodes),
             velocities: of(3 * nodes),
+            node_velocities: of(3 * nodes),
         };
         Self { recording, nodes }
+    }
+
+    /// Joint angles of the last record (rad).
+    fn last_angles(&self) -> &[f64] {
+        let angles = &self.recording.angles;
+        &angles[angles.len() - (self.nodes - 2)..]
     }
 
     fn record(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
@@ -204,6 +245,8 @@ impl Recorder {
         let at = r.positions.len();
         r.positions.resize(at + 3 * self.nodes, 0.0);
         r.velocities.resize(at + 3 * self.nodes, 0.0);
-        engine.nodes(&mut r.positions[at..], &mut r.velocities[at..])
+        engine.nodes(&mut r.positions[at..], &mut r.velocities[at..])?;
+        r.node_velocities.extend_from_slice(&r.velocities[at..]);
+        engine.correct_velocities(&mut r.node_velocities[at..])
     }
 }

@@ -29,6 +29,12 @@ fn robot(experiment: &Experiment) -> Value {
         for key in ["drive", "start", "steps", "record_every_steps", "record_from_step"] {
             fields.remove(key);
         }
+        // Limits decide no bits.
+        if let Some(Value::Object(material)) = fields.get_mut("material") {
+            for key in ["max_field", "max_strain"] {
+                material.remove(key);
+            }
+        }
     }
     spec
 }

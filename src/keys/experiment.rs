@@ -51,6 +51,18 @@ pub(super) const MATERIAL: Section = Section {
         ),
         key("adhesive_thickness_um", Number(NotNegative), OfPreset("10", "10"), "thickness of the adhesive; 0 leaves two layers"),
         key("adhesive_density_g_cm3", Number(NotNegative), OfPreset("1.07", "1.07"), "density of the adhesive"),
+        key(
+            "max_field_kv_mm",
+            Number(Positive),
+            OfPreset("4", "4"),
+            "largest field: voltages above this times electrode_pitch_mm are refused (2000 V over 0.5 mm)",
+        ),
+        key(
+            "max_strain",
+            Number(Positive),
+            OfPreset("0.006", "0.006"),
+            "largest strain of the laminate's outer fibre by bending: above it a run warns, above twice it gives no measures",
+        ),
     ],
 };
 

@@ -39,7 +39,16 @@ pub struct Material {
     pub adhesive_thickness: f64,
     /// Density of the adhesive (g/cm³).
     pub adhesive_density: f64,
+    /// Largest electric field between neighbouring electrodes (V/cm).
+    pub max_field: f64,
+    /// Largest strain of the laminate's outer fibre (–) for which a result is given.
+    pub max_strain: f64,
 }
+
+/// Field of 2000 V over 0.5 mm (V/cm): the reference goes to 1500 V, and soft PZT breaks down at some 4 kV/mm.
+const MAX_FIELD: f64 = 4e4;
+/// The presets reach 5.15e-3, cantilevers at resonance under 1500 V; the data sheet of the MFC actuator allows 4.5e-3 in tension.
+const MAX_STRAIN: f64 = 6e-3;
 
 impl Material {
     /// The reference's default set: it matches the published deflection.
@@ -60,6 +69,8 @@ impl Material {
         adhesive_modulus: 1.489e10,
         adhesive_thickness: 10.0e-4,
         adhesive_density: 1.07,
+        max_field: MAX_FIELD,
+        max_strain: MAX_STRAIN,
     };
 
     /// The reference's other set: it matches the published resonance. No set matches both.
@@ -100,12 +111,30 @@ impl Material {
         ] {
             ModelError::unless(value.is_finite() && value >= 0.0, key, value, "zero or more")?;
         }
+        // Infinity is no limit.
+        for (key, value) in [("material.max_field_kv_mm", self.max_field), ("material.max_strain", self.max_strain)] {
+            ModelError::unless(value > 0.0, key, value, "positive")?;
+        }
         for (key, value) in
             [("material.piezo_poisson", self.piezo_poisson), ("material.substrate_poisson", self.substrate_poisson)]
         {
             ModelError::unless(value.is_finite() && (0.0..=0.5).contains(&value), key, value, "between 0 and 0.5")?;
         }
         Ok(())
+    }
+}
+
+impl Material {
+    /// Largest voltage between neighbouring electrodes (V).
+    pub fn max_voltage(&self) -> f64 {
+        self.max_field * self.electrode_pitch
+    }
+
+    /// Distance of the outer fibre from the neutral axis (cm): the strain there is this times the curvature.
+    pub fn outer_fibre(&self) -> f64 {
+        let above = self.adhesive_thickness + self.piezo_thickness;
+        let axis = Laminate::new(self).neutral_axis;
+        (above - axis).max(axis + self.substrate_thickness)
     }
 }
 
@@ -222,6 +251,7 @@ mod tests {
         let h: f64 = 0.06;
         assert!((laminate.flexural_rigidity / (e * h.powi(3) / 12.0) - 1.0).abs() < 1e-14);
         assert!(laminate.neutral_axis.abs() < 1e-17);
+        assert!((sheet.outer_fibre() - 0.5 * h).abs() < 1e-16);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! From a laminate to a chain of motor-link units.
 
+use super::units::mm_from_cm;
 use super::{Extensions, Laminate, Material, ModelError, PointMass};
 use crate::actuator::PiezoJoint;
+use crate::words::number;
 
 /// How the robot is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -209,6 +211,27 @@ impl Robot {
     /// Number of bodies that one film covers: `ceil(m·fraction + 0.5)`, as the reference counts.
     fn film_segments(&self) -> usize {
         (self.motors_per_actuator as f64 * self.friction.film_fraction + 0.5).ceil() as usize
+    }
+
+    /// Checks that the material bears a commanded voltage (V), with the robot's factor on positive ones.
+    ///
+    /// # Errors
+    /// What is wrong with it, as the end of a sentence that begins with the key.
+    pub fn check_voltage(&self, voltage: f64) -> Result<(), String> {
+        let (applied, gain) = if voltage > 0.0 { (voltage * self.positive_gain, self.positive_gain) } else { (voltage, 1.0) };
+        let limit = self.material.max_voltage();
+        if applied.abs() <= limit {
+            return Ok(());
+        }
+        let times = if gain == 1.0 { String::new() } else { format!(", times positive_gain {} V", number(applied)) };
+        Err(format!(
+            "is {} V{times}, but the material bears at most {} V, {} kV/mm over the electrode pitch of {} mm; set \
+             material.max_field_kv_mm higher if yours bears more",
+            number(voltage),
+            number(limit),
+            number(self.material.max_field / 1e4),
+            number(mm_from_cm(self.material.electrode_pitch))
+        ))
     }
 
     /// Checks that the robot can be built.

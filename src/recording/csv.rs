@@ -9,7 +9,8 @@ use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError, check_value
 use crate::files;
 use crate::model::units::{cm_from_mm, mm_from_cm};
 
-/// Writes a recording: time, then angle, rate, torque and voltage of each joint, then x and z of each node. y is left out.
+/// Writes a recording: time, then angle, rate, torque and voltage of each joint, then x and z of each node, then the velocity of
+/// each node itself, where it is known. y is left out.
 ///
 /// Numbers are written with as many digits as bring back the same bits.
 ///
@@ -24,11 +25,13 @@ pub fn write(recording: &Recording, writer: impl Write, path: &Path) -> Result<(
 /// Name and unit of the quantities of joints, in the order of the columns.
 const OF_JOINTS: [(&str, &str); 4] = [("theta", "rad"), ("rate", "rad_s"), ("torque", "dyn_cm"), ("motor_voltage", "v")];
 
-/// The columns for a number of joints.
-fn header(joints: usize) -> Vec<String> {
+/// The columns for a number of joints, with or without the nodes' velocities.
+fn header(joints: usize, velocities: bool) -> Vec<String> {
     let of_joints = OF_JOINTS.iter().flat_map(|(name, unit)| (1..=joints).map(move |joint| format!("{name}{joint}_{unit}")));
     let of_nodes = (0..joints + 2).flat_map(|node| ["x", "z"].map(|axis| format!("node{node}_{axis}_mm")));
-    std::iter::once("t_s".to_owned()).chain(of_joints).chain(of_nodes).collect()
+    let nodes = if velocities { joints + 2 } else { 0 };
+    let moving = (0..nodes).flat_map(|node| ["x", "z"].map(|axis| format!("node{node}_velocity_{axis}_mm_s")));
+    std::iter::once("t_s".to_owned()).chain(of_joints).chain(of_nodes).chain(moving).collect()
 }
 
 /// Whether a file begins as a recording does: other tables of this program begin otherwise.
@@ -38,7 +41,8 @@ pub fn is_recording(path: &Path) -> bool {
     read.is_ok() && start.starts_with(b"t_s,theta1_rad,")
 }
 
-/// Reads a recording that [`write`] wrote. y and the nodes' velocities, which are not in it, are NaN. What only the manifest beside it
+/// Reads a recording that [`write`] wrote, also one of an older version without the nodes' velocities. y and the velocities as the
+/// reference records them, which are not in it, are NaN. What only the manifest beside it
 /// knows (which joints share an actuator, whether there is a floor) is taken from there; without one, every joint counts as an
 /// actuator, and the words returned say so.
 ///
@@ -91,8 +95,9 @@ fn meta(spec: &Value) -> Option<Meta> {
 fn parse(bytes: &[u8]) -> Result<Recording, String> {
     let mut reader = csv::Reader::from_reader(bytes);
     let found = reader.headers().map_err(|error| error.to_string())?.clone();
-    let joints = found.len().saturating_sub(5) / 6;
-    let wanted = header(joints);
+    let velocities = found.iter().any(|name| name.contains("_velocity_"));
+    let joints = if velocities { found.len().saturating_sub(9) / 8 } else { found.len().saturating_sub(5) / 6 };
+    let wanted = header(joints, velocities);
     if joints == 0 || found.len() != wanted.len() {
         return Err(format!("line 1: {} columns are not those of a recording", found.len()));
     }
@@ -123,7 +128,11 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
         for (column, values) in columns.into_iter().zip(of_joints.chunks_exact(joints)) {
             column.extend(values);
         }
-        for node in of_nodes.chunks_exact(2) {
+        let (places, moving) = of_nodes.split_at(2 * (joints + 2));
+        for velocity in moving.chunks_exact(2) {
+            recording.node_velocities.extend([cm_from_mm(velocity[0]), f64::NAN, cm_from_mm(velocity[1])]);
+        }
+        for node in places.chunks_exact(2) {
             recording.positions.extend([cm_from_mm(node[0]), f64::NAN, cm_from_mm(node[1])]);
             recording.velocities.extend([f64::NAN; 3]);
         }
@@ -134,7 +143,8 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
 fn rows<W: Write>(recording: &Recording, table: &mut csv::Writer<W>) -> csv::Result<()> {
     let (joints, nodes) = (recording.joints(), recording.nodes());
     let columns = [&recording.angles, &recording.rates, &recording.torques, &recording.motor_voltages];
-    table.write_record(header(joints))?;
+    let velocities = &recording.node_velocities;
+    table.write_record(header(joints, !velocities.is_empty()))?;
     for (record, time) in recording.time.iter().enumerate() {
         table.write_field(number(*time))?;
         for values in columns {
@@ -146,6 +156,12 @@ fn rows<W: Write>(recording: &Recording, table: &mut csv::Writer<W>) -> csv::Res
             let [x, _, z] = recording.node(record, node);
             table.write_field(number(mm_from_cm(x)))?;
             table.write_field(number(mm_from_cm(z)))?;
+        }
+        if !velocities.is_empty() {
+            for velocity in velocities[3 * nodes * record..3 * nodes * (record + 1)].chunks_exact(3) {
+                table.write_field(number(mm_from_cm(velocity[0])))?;
+                table.write_field(number(mm_from_cm(velocity[2])))?;
+            }
         }
         table.write_record(None::<&[u8]>)?;
     }
@@ -174,25 +190,35 @@ mod tests {
             motor_voltages: vec![0.0],
             positions: vec![0.0, 9.0, 0.1, 1.0, 9.0, 0.2, 2.0, 9.0, 0.3],
             velocities: vec![0.0; 9],
+            node_velocities: vec![0.0, 9.0, 0.4, 1.0, 9.0, 0.5, 2.0, 9.0, 0.6],
         };
         let mut out = Vec::new();
         write(&recording, &mut out, Path::new("x.csv")).unwrap();
         let mut reader = csv::Reader::from_reader(out.as_slice());
         assert_eq!(
             reader.headers().unwrap().iter().collect::<Vec<_>>().join(","),
-            "t_s,theta1_rad,rate1_rad_s,torque1_dyn_cm,motor_voltage1_v,node0_x_mm,node0_z_mm,node1_x_mm,node1_z_mm,node2_x_mm,node2_z_mm"
+            "t_s,theta1_rad,rate1_rad_s,torque1_dyn_cm,motor_voltage1_v,node0_x_mm,node0_z_mm,node1_x_mm,node1_z_mm,node2_x_mm,node2_z_mm,\
+             node0_velocity_x_mm_s,node0_velocity_z_mm_s,node1_velocity_x_mm_s,node1_velocity_z_mm_s,\
+             node2_velocity_x_mm_s,node2_velocity_z_mm_s"
         );
         let back = parse(&out).unwrap();
         assert_eq!((&back.time, &back.angles, &back.torques), (&recording.time, &recording.angles, &recording.torques));
         let places: Vec<f64> = (0..3).flat_map(|node| [back.node(0, node)[0], back.node(0, node)[2]]).collect();
         assert_eq!(places, [0.0, 0.1, 1.0, 0.2, 2.0, 0.3]);
+        let moving: Vec<f64> = back.node_velocities.chunks(3).flat_map(|v| [v[0], v[2]]).collect();
+        assert_eq!(moving, [0.0, 0.4, 1.0, 0.5, 2.0, 0.6]);
+        // As older versions wrote it.
+        let mut older = Vec::new();
+        write(&Recording { node_velocities: Vec::new(), ..recording.clone() }, &mut older, Path::new("x.csv")).unwrap();
+        let older = parse(&older).unwrap();
+        assert_eq!((older.angles, older.node_velocities), (recording.angles.clone(), Vec::new()));
         let row: Vec<f64> = reader.records().next().unwrap().unwrap().iter().map(|f| f.parse().unwrap()).collect();
-        assert_eq!(row, [third, third, -1e-300, 1e20, 0.0, 0.0, 1.0, 10.0, 2.0, 20.0, 3.0]);
+        assert_eq!(row, [third, third, -1e-300, 1e20, 0.0, 0.0, 1.0, 10.0, 2.0, 20.0, 3.0, 0.0, 4.0, 10.0, 5.0, 20.0, 6.0]);
     }
 
     #[test]
     fn what_is_no_recording_is_refused_with_its_line() {
-        let header = header(1).join(",");
+        let header = header(1, false).join(",");
         for (text, words) in [
             ("a,b\n1,2\n".to_owned(), "line 1: 2 columns"),
             (

@@ -100,8 +100,13 @@ pub struct Recording {
     pub motor_voltages: Vec<f64>,
     /// Nodes (cm), T × (J + 2) × 3.
     pub positions: Vec<f64>,
-    /// Velocities of the nodes (cm/s), T × (J + 2) × 3.
+    /// Velocities as the reference records them (cm/s), T × (J + 2) × 3. On Bullet: the left end's own, for each joint that of the centre of
+    /// mass of the link behind it, one step late, and for the right end that centre's with a whole link as lever. On the planar engine:
+    /// the nodes' own.
     pub velocities: Vec<f64>,
+    /// Velocities of the nodes themselves at the recorded time, on either engine (cm/s), T × (J + 2) × 3; empty if they are not known, as in
+    /// files of the reference.
+    pub node_velocities: Vec<f64>,
 }
 
 impl Recording {

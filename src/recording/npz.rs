@@ -3,8 +3,9 @@
 //! Written: `dataTime` (T), `dataTheta`, `dataAngularVelocities`, `dataTor`, `dataMotorVoltages` (T, J), `dataPositions`,
 //! `dataPositionVelocities` (T, J+2, 3), and as scalars `timeStep`, `simCycles`, `recordStepInterval`, `N`, `m`, `actuatorLength`,
 //! `drivenFrequency`, `dampingEta`; for robots on the ground also `dateTime`, `frictionLow`, `frictionHigh`, `period`.
-//! CGS units, as the reference. Read: the same; `dateTime` and keys that are not listed are ignored, `dampingEta` and the keys of
-//! robots may be missing.
+//! CGS units, as the reference. Beyond the reference: `nodes_velocity` (T, J+2, 3), the velocities of the nodes themselves, which
+//! `dataPositionVelocities` holds for the planar engine only (see [`Recording::velocities`]). Read: the same; `dateTime` and keys that
+//! are not listed are ignored, `dampingEta`, `nodes_velocity` and the keys of robots on the ground may be missing.
 
 use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
@@ -68,6 +69,9 @@ fn fill<W: Write + Seek>(recording: &Recording, archive: &mut NpzWriter<W>) -> R
     add("dataMotorVoltages", &[t, j], &recording.motor_voltages)?;
     add("dataPositions", &[t, j + 2, 3], &recording.positions)?;
     add("dataPositionVelocities", &[t, j + 2, 3], &recording.velocities)?;
+    if !recording.node_velocities.is_empty() {
+        add("nodes_velocity", &[t, j + 2, 3], &recording.node_velocities)?;
+    }
     let meta = &recording.meta;
     for (name, value) in [
         ("timeStep", meta.time_step),
@@ -139,6 +143,12 @@ impl<R: Read + Seek> Arrays<R> {
         }
         check_values(&array.values).map_err(|reason| format!("key {key}: {reason}"))?;
         Ok(array.values)
+    }
+
+    /// The same, or nothing where there is no such key.
+    fn values_if_there(&mut self, key: &str, shape: &[usize]) -> Result<Vec<f64>, String> {
+        let there = self.0.file_names().any(|name| name.strip_suffix(".npy").unwrap_or(name) == key);
+        if there { self.values(key, shape) } else { Ok(Vec::new()) }
     }
 
     /// A scalar, stored as a float or an integer.
@@ -214,6 +224,7 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
         positions: arrays.values("dataPositions", &[t, joints + 2, 3])?,
         velocities: arrays.values("dataPositionVelocities", &[t, joints + 2, 3])?,
         time,
+        node_velocities: arrays.values_if_there("nodes_velocity", &[t, joints + 2, 3])?,
     })
 }
 
@@ -243,6 +254,7 @@ mod tests {
             motor_voltages: numbers(2 * records),
             positions: numbers(12 * records),
             velocities: numbers(12 * records),
+            node_velocities: numbers(12 * records).iter().map(|value| 2.0 * value).collect(),
         }
     }
 
@@ -257,6 +269,9 @@ mod tests {
         for records in [0, 1, 3] {
             let recording = sample(records);
             assert_eq!(read(&bytes(&recording), Path::new("sample.npz")).unwrap(), recording);
+            // As in files of the reference.
+            let without = Recording { node_velocities: Vec::new(), ..recording };
+            assert_eq!(read(&bytes(&without), Path::new("sample.npz")).unwrap(), without);
         }
     }
 

@@ -1,8 +1,11 @@
 //! Domains keep switching slowly after a change of voltage.
 //!
 //! ```text
-//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r) up to three times the record's length,  w_j = c/r·(T_j/1 s)^p
+//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r) up to T_max,  w_j = c/r·(T_j/1 s)^p
 //! ```
+//!
+//! T_max is three times the run's length unless it is given. A run that goes on from a saved state keeps the levels that it began with, whatever its
+//! length; runs of different lengths are of the same robot only where T_max is given.
 //!
 //! With p = 0 a step grows by c of itself in every decade of time, with another p by a power law of time. r is the number of rungs in a decade; the
 //! usual ladder has one, the first at 0.1 s. With r = 0 there is one rung of the weight c: a Kelvin-Voigt element.
@@ -42,21 +45,50 @@ pub const CREEP: Effect = Effect {
             default: Some(0.1),
             about: "time constant T_0 of the first rung",
         },
+        Parameter {
+            name: "slowest_s",
+            unit: "s",
+            bounds: [0.0, 1e9],
+            off: None,
+            default: Some(0.0),
+            about: "largest time constant T_max; 0 is three times the run's length",
+        },
     ],
     action: Action::Voltages(|p, n, duration| {
-        let rungs = ladder(p[0], p[1], p[2], p[3], duration);
-        Box::new(Creep { behind: vec![vec![0.0; n]; rungs.len()], rungs })
+        let ladder = Ladder { growth: p[0], power: p[1], per_decade: p[2], fastest: p[3] };
+        let rungs = ladder.up_to(if p[4] > 0.0 { p[4] } else { 3.0 * duration });
+        Box::new(Creep { behind: vec![vec![0.0; n]; rungs.len()], rungs, ladder, actuators: n })
     }),
 };
 
-/// Time constant (s) and weight of every rung in a run of `duration` (s).
-fn ladder(growth: f64, power: f64, per_decade: f64, fastest: f64, duration: f64) -> Vec<[f64; 2]> {
-    if per_decade == 0.0 {
-        return vec![[fastest, growth]];
+/// What decides the time constant (s) and weight of every rung.
+#[derive(Debug, Clone, Copy)]
+struct Ladder {
+    growth: f64,
+    power: f64,
+    per_decade: f64,
+    fastest: f64,
+}
+
+impl Ladder {
+    fn time(&self, rung: usize) -> f64 {
+        self.fastest * 10_f64.powf(rung as f64 / self.per_decade)
     }
-    let times = (0..).map(|rung| fastest * 10_f64.powf(f64::from(rung) / per_decade));
-    let rungs = times.enumerate().take_while(|(rung, time)| *rung == 0 || *time <= 3.0 * duration);
-    rungs.map(|(_, time)| [time, growth / per_decade * time.powf(power)]).collect()
+
+    /// The first `count` of them.
+    fn rungs(&self, count: usize) -> Vec<[f64; 2]> {
+        if self.per_decade == 0.0 {
+            return vec![[self.fastest, self.growth]];
+        }
+        let rung = |rung| [self.time(rung), self.growth / self.per_decade * self.time(rung).powf(self.power)];
+        (0..count).map(rung).collect()
+    }
+
+    /// Those of time constants up to `slowest` (s), at least the first.
+    fn up_to(&self, slowest: f64) -> Vec<[f64; 2]> {
+        let more = if self.per_decade == 0.0 { 0 } else { (1..).take_while(|rung| self.time(*rung) <= slowest).count() };
+        self.rungs(1 + more)
+    }
 }
 
 struct Creep {
@@ -64,7 +96,12 @@ struct Creep {
     rungs: Vec<[f64; 2]>,
     /// q_j of every actuator.
     behind: Vec<Vec<f64>>,
+    ladder: Ladder,
+    actuators: usize,
 }
+
+/// Most rungs that a memory may hold: four in each of 50 decades.
+const MOST_RUNGS: f64 = 200.0;
 
 impl Voltages for Creep {
     /// What has crept before is part of the settled shape: q_j = V.
@@ -88,12 +125,22 @@ impl Voltages for Creep {
         }
     }
 
+    /// The number of rungs, then q_j.
     fn memory(&self) -> Vec<f64> {
-        self.behind.concat()
+        std::iter::once(self.rungs.len() as f64).chain(self.behind.iter().flatten().copied()).collect()
+    }
+
+    fn held(&self, saved: &[f64]) -> Option<usize> {
+        let count = *saved.first()?;
+        let fits = count.fract() == 0.0 && (1.0..=MOST_RUNGS).contains(&count) && (count == 1.0 || self.ladder.per_decade > 0.0);
+        let held = 1 + count as usize * self.actuators;
+        (fits && held <= saved.len()).then_some(held)
     }
 
     fn remember(&mut self, memory: &[f64]) {
-        self.behind.iter_mut().flatten().zip(memory).for_each(|(q, kept)| *q = *kept);
+        let [count, behind @ ..] = memory else { return };
+        self.rungs = self.ladder.rungs(*count as usize);
+        self.behind = behind.chunks_exact(self.actuators).map(<[f64]>::to_vec).collect();
     }
 }
 
@@ -104,7 +151,7 @@ mod tests {
     #[test]
     fn a_step_grows_by_the_same_amount_in_every_decade() {
         let Action::Voltages(make) = CREEP.action else { unreachable!() };
-        let mut creep = make(&[0.02, 0.0, 1.0, 0.1], 1, 100.0);
+        let mut creep = make(&[0.02, 0.0, 1.0, 0.1, 0.0], 1, 100.0);
         creep.settle(&mut [0.0]);
         let (dt, mut at) = (1e-3, Vec::new());
         for step in 1..=30_000 {
@@ -136,15 +183,15 @@ mod tests {
             }
             found
         };
-        let fine = at(&[0.02, 0.0, 4.0, 0.01], &[300, 3_000, 30_000]);
+        let fine = at(&[0.02, 0.0, 4.0, 0.01, 0.0], &[300, 3_000, 30_000]);
         // Four rungs a decade: no ripple to speak of.
         assert!(fine.windows(2).all(|pair| (pair[1] - pair[0] - 20.0).abs() < 0.02), "{fine:?}");
         // w = c/r·T^p over rungs that are dense in log T: c·Γ(1 − p)/(p ln 10)·t^p but for a constant.
-        let power = at(&[0.02, 0.3, 4.0, 0.01], &[300, 3_000, 30_000]);
+        let power = at(&[0.02, 0.3, 4.0, 0.01, 0.0], &[300, 3_000, 30_000]);
         let ratio = (power[2] - power[1]) / (power[1] - power[0]);
         assert!((ratio / 10_f64.powf(0.3) - 1.0).abs() < 0.01, "{power:?}");
         // One rung: 1 − exp(−t/T).
-        let single = at(&[0.02, 0.0, 0.0, 2.0], &[2_000]);
+        let single = at(&[0.02, 0.0, 0.0, 2.0, 0.0], &[2_000]);
         assert!((single[0] - 20.0 * -(-1.0_f64).exp_m1()).abs() < 0.01, "{single:?}");
     }
 }

@@ -54,9 +54,10 @@ use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
+pub(super) use self::newton::LIFT_ENOUGH;
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
-use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase, Unsettled};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
 use crate::model::{Mount, Robot};
@@ -91,7 +92,6 @@ pub struct PlanarEngine {
     gains: Vec<f64>,
     beyond: Option<Beyond>,
     time_step: f64,
-    stable_step: f64,
     gravity: f64,
     /// Along x and z (cm/s²).
     pull: [f64; 2],
@@ -136,13 +136,14 @@ pub struct PlanarEngine {
     iterations: u64,
     /// Energy that the weight of the step's end has taken so far (erg).
     numerical_loss: f64,
+    unsettled: Option<Unsettled>,
 }
 
 impl PlanarEngine {
     /// Builds `robot`, at rest and flat, to be stepped by `time_step` (s).
     ///
     /// # Errors
-    /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::StepTooLong`].
+    /// [`EngineError::Model`] for a robot that cannot be built, [`EngineError::TimeStep`], [`EngineError::StepTooLong`].
     pub fn new(robot: &Robot, time_step: f64) -> Result<Self, EngineError> {
         Self::with_numerical_damping(robot, time_step, NUMERICAL_DAMPING)
     }
@@ -153,8 +154,9 @@ impl PlanarEngine {
     /// As [`new`](Self::new).
     pub fn with_numerical_damping(robot: &Robot, time_step: f64, damping: f64) -> Result<Self, EngineError> {
         robot.check()?;
+        EngineError::unless_step(time_step)?;
         let longest = 0.1 / (analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2));
-        if time_step.is_nan() || time_step > longest {
+        if time_step > longest {
             return Err(EngineError::StepTooLong { time_step, longest });
         }
         let segments = robot.segments();
@@ -219,7 +221,6 @@ impl PlanarEngine {
             gains: extensions.joint_gains.clone(),
             beyond: Beyond::new(extensions, robot.material.width, robot.link_length(), time_step, &quads),
             time_step,
-            stable_step: analytic::stable_step(robot),
             gravity: robot.material.gravity,
             pull: pull(robot.material.gravity, extensions.slope),
             mass,
@@ -251,6 +252,7 @@ impl PlanarEngine {
             turns: [0.0; 2],
             iterations: 0,
             numerical_loss: 0.0,
+            unsettled: None,
         })
     }
 
@@ -524,7 +526,7 @@ impl PlanarEngine {
         let what =
             bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
         let time = self.step as f64 * self.time_step;
-        Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: self.stable_step })
+        Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: None })
     }
 }
 
@@ -562,6 +564,7 @@ fn joints_of(k: usize, root: usize) -> (Option<usize>, usize) {
 
 impl Engine for PlanarEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
+        EngineError::unless_voltages(voltages.len(), self.actuators())?;
         self.apply(voltages);
         if self.finite { Ok(()) } else { self.check_finite() }
     }
@@ -700,6 +703,14 @@ impl Engine for PlanarEngine {
         self.finite = false;
         self.step = step;
         Ok(())
+    }
+
+    fn actuators(&self) -> usize {
+        (self.count - 1) / self.motors_per_actuator
+    }
+
+    fn unsettled(&self) -> Option<Unsettled> {
+        self.unsettled
     }
 
     fn step(&self) -> u64 {

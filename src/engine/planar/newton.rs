@@ -7,7 +7,7 @@ use fearless_simd::{Simd, prelude::*};
 use super::contact::Law;
 use super::lanes::{Four, Lanes, Two, fma, inner};
 use super::recursion::{Articulated, BLOCK, Motions, solve};
-use super::{EngineError, FrictionModel, PlanarEngine};
+use super::{EngineError, FrictionModel, PlanarEngine, Unsettled};
 use crate::model::Mount;
 
 /// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured: 33 in a second of the paper's
@@ -33,7 +33,7 @@ const DONE_OF_KINETIC: f64 = 1e-18;
 
 /// Fixed-point iterations towards Coulomb's friction end when no lift changes by more than this (cm/s), or after so many: then the last one
 /// stands. Measured at 5 Hz: a hundredth of this changes speeds of the paper's sequence by 1 % on films of friction 4 and by 3 to 6 % on films of 1.
-const LIFT_ENOUGH: f64 = 0.1;
+pub(in crate::engine) const LIFT_ENOUGH: f64 = 0.1;
 const LARGEST_LIFTS: u32 = 100;
 
 /// How a search along a Newton step ended.
@@ -55,16 +55,21 @@ impl PlanarEngine {
             let (height, velocity) = self.root_over_floor(simd);
             self.floor.find(&self.quads, self.rungs, height, velocity, law)
         };
+        let mut changed = 0.0_f64;
         for lifts in 0..=LARGEST_LIFTS {
             let iterations = self.newton(simd, law)?;
             if !near {
                 break;
             }
             self.iterations += iterations;
-            if self.friction == FrictionModel::Convex || lifts == LARGEST_LIFTS {
+            if self.friction == FrictionModel::Convex {
                 break;
             }
-            let mut changed = 0.0_f64;
+            if lifts == LARGEST_LIFTS {
+                self.leave_unsettled(changed);
+                break;
+            }
+            changed = 0.0;
             let all = self.floor.all();
             self.floor.near(&all, &self.quads, |_, corners, mean| changed = changed.max(corners.take_off_lift(mean, law)));
             if changed < LIFT_ENOUGH {
@@ -72,6 +77,19 @@ impl PlanarEngine {
             }
         }
         Ok(())
+    }
+
+    /// Notes that the lifts still changed by so much (cm/s) when the iteration ended.
+    #[cold]
+    fn leave_unsettled(&mut self, changed: f64) {
+        let step = self.step;
+        let noted = self.unsettled.get_or_insert(Unsettled { steps: 0, first_step: step, last_step: step, largest: 0.0 });
+        // A step is repeated where joints rub.
+        if noted.steps == 0 || noted.last_step != step {
+            noted.steps += 1;
+        }
+        noted.last_step = step;
+        noted.largest = noted.largest.max(changed);
     }
 
     /// Solves for the corners as they are placed; returns how many Newton steps it took.

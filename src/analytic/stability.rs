@@ -1,0 +1,319 @@
+//! The largest stable time step of torques that act with the state of a step's beginning, in time linear in the number of joints.
+
+use nalgebra::SMatrix;
+
+use crate::model::{DRY_FRICTION_RATE, LOSS_TIMES, Mount, Robot};
+
+/// Share of the result that bisections end at.
+const PRECISION: f64 = 1e-15;
+/// Frequencies that a robot with a loss ladder is tested at, and the lowest as a share of the highest.
+const FREQUENCIES: u32 = 24;
+const LOWEST_SHARE: f64 = 1e-4;
+/// Growth per step that counts as rounding.
+const GROWTH: f64 = 1e-9;
+
+/// A body in the vertical plane: mass (g), first moment about its left end (g·cm), inertia about its left end (g·cm²).
+#[derive(Debug, Clone, Copy, Default)]
+struct Inertia {
+    mass: f64,
+    moment: f64,
+    about_end: f64,
+}
+
+/// The flat chain for small motion across it: coordinates are height and pitch of the left end, then the joints.
+struct Chain {
+    bodies: Vec<Inertia>,
+    lengths: Vec<f64>,
+    mount: Mount,
+    /// Of the clamp (dyn·cm/rad), if it gives.
+    clamp: Option<f64>,
+}
+
+impl Chain {
+    fn new(robot: &Robot) -> Self {
+        let lengths: Vec<f64> = robot.segments().iter().map(|segment| segment.length).collect();
+        let bodies = robot.rigid_bodies();
+        let compliance = robot.extensions.clamp_compliance;
+        let inertia = |(body, length): (&crate::model::RigidBody, &f64)| {
+            let arm = body.middle * length;
+            Inertia { mass: body.mass, moment: body.mass * arm, about_end: body.inertia + body.mass * arm * arm }
+        };
+        Self {
+            bodies: bodies.iter().zip(&lengths).map(inertia).collect(),
+            lengths,
+            mount: robot.mount,
+            clamp: (robot.mount == Mount::Clamped && compliance > 0.0).then(|| 1.0 / compliance),
+        }
+    }
+
+    /// Whether `scale`·M − `drag`·(turns of the bodies) + `joint`·(turns of the joints) + `clamp`·(turn of the clamp) is positive definite:
+    /// all pivots of the articulated-body recursion from the right end are positive.
+    fn is_positive(&self, scale: f64, drag: f64, joint: f64, clamp: f64) -> bool {
+        let mut outboard = Inertia::default();
+        for (i, (body, length)) in self.bodies.iter().zip(&self.lengths).enumerate().rev() {
+            // What hangs on the right end, felt at the left one.
+            let Inertia { mass, moment, about_end } = outboard;
+            let felt = Inertia {
+                mass: scale * body.mass + mass,
+                moment: scale * body.moment + moment + mass * length,
+                about_end: scale * body.about_end - drag + about_end + length * (2.0 * moment + mass * length),
+            };
+            if i == 0 {
+                return match self.mount {
+                    Mount::Clamped => self.clamp.is_none() || felt.about_end + clamp > 0.0,
+                    _ => felt.mass > 0.0 && felt.mass * felt.about_end - felt.moment * felt.moment > 0.0,
+                };
+            }
+            let pivot = felt.about_end + joint;
+            if pivot.is_nan() || pivot <= 0.0 {
+                return false;
+            }
+            outboard = Inertia {
+                mass: felt.mass - felt.moment * felt.moment / pivot,
+                moment: felt.moment * joint / pivot,
+                about_end: felt.about_end * joint / pivot,
+            };
+        }
+        true
+    }
+
+    /// Inertia about its joint of the last body: no smaller than the smallest eigenvalue of the joints' mass matrix.
+    fn last(&self) -> f64 {
+        self.bodies.last().map_or(0.0, |body| body.about_end)
+    }
+}
+
+/// The largest x up to `high` for which `holds` does, if it holds below some x only.
+fn largest(high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    if holds(high) {
+        return high;
+    }
+    let (mut low, mut high) = (0.0, high);
+    while high - low > PRECISION * high && high > f64::MIN_POSITIVE {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// Largest angular frequency ω (rad/s) at which the flat robot's joints vibrate against their springs, without contact.
+///
+/// ```text
+/// det(K − ω² M) = 0,   K = k·1,   M the mass matrix of the joints, the base held or eliminated
+/// ```
+///
+/// A clamp that gives counts as a hinge.
+pub fn highest_joint_frequency(robot: &Robot) -> f64 {
+    let chain = Chain::new(robot);
+    // K is a multiple of the unit matrix: the largest ω² is k over the smallest eigenvalue of M.
+    let smallest = largest(chain.last(), |eigenvalue| chain.is_positive(1.0, 0.0, -eigenvalue, 0.0));
+    (robot.joint().stiffness / smallest).sqrt()
+}
+
+/// Largest time step (s) for which the torque law, evaluated at the start of each step, is stable.
+///
+/// Semi-implicit Euler with explicit damping, `M (v⁺ − v) = −h (C v + K θ)`, `θ⁺ = θ + h v⁺`, is stable as long as
+///
+/// ```text
+/// 4 M − 2 h C − h² K    is positive definite
+/// ```
+///
+/// for at its loss of definiteness a mode first alternates undiminished from step to step. For one mode of frequency ω with c = ηω² that is
+/// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require less.
+///
+/// The robot's extensions count: factors on stiffness, damping and mass, point masses, a clamp that gives (implicit, so that it adds `h²/c` at
+/// the root), dry friction in the joints with its slope at rest, viscous friction on the floor (bounded from above), the loss ladder (by the
+/// spectral radius of a step at frequencies up to the highest). Hardening is left to [`stable_step_at`]; drag in air, whose rate
+/// stays below 1 % of 1/h at any speed that Bullet allows, is left out.
+pub fn stable_step(robot: &Robot) -> f64 {
+    stable_step_at(robot, 0.0)
+}
+
+/// The same for joints bent elastically by `curvature` (1/cm), where they may be stiffer than flat ones.
+pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
+    let (chain, joint, extensions) = (Chain::new(robot), robot.joint(), &robot.extensions);
+    // The slope of k δ (1 − a (δ/ℓ)²).
+    let hardening = 1.0 + 3.0 * (-extensions.softening).max(0.0) * curvature * curvature;
+    let stiffness = joint.stiffness * hardening;
+    let damping = joint.stiffness * joint.damping_time + extensions.dry_friction / DRY_FRICTION_RATE;
+    let viscous = if robot.mount == Mount::Ground { extensions.stick_slip.viscous } else { 0.0 };
+    let below = 0.5 * robot.collision_thickness;
+    let mass: f64 = chain.bodies.iter().map(|body| body.mass).sum();
+    let holds = |h: f64| {
+        // A floor's force −F_v (v + ω b) takes no more power than −2 F_v (v² + ω² b²); along itself the flat chain is rigid.
+        4.0 * mass > 4.0 * h * viscous * chain.bodies.len() as f64
+            && chain.is_positive(
+                4.0,
+                4.0 * h * viscous * below * below,
+                -h * (2.0 * damping + h * stiffness),
+                h * h * chain.clamp.unwrap_or(0.0),
+            )
+    };
+    // Stable for the last body alone: √(c² + 4ω²) − c without cancellation.
+    let (omega2, c) = (stiffness / chain.last(), damping / chain.last());
+    let step = largest(4.0 / ((c * c + 4.0 * omega2).sqrt() + c), holds);
+    if extensions.loss == 0.0 {
+        return step;
+    }
+    let highest = highest_joint_frequency(robot).powi(2) * hardening;
+    let share = |n: u32| LOWEST_SHARE.powf(2.0 * f64::from(n) / f64::from(FREQUENCIES));
+    largest(step.min(2.0 * LOSS_TIMES[0]), |h| {
+        (0..=FREQUENCIES).all(|n| ladder_is_stable(highest * share(n), damping / stiffness, extensions.loss, h))
+    })
+}
+
+/// Whether a step of length `h` (s) lets no mode of the square `omega2` of its frequency (1/s²), with damping time `damping` (s), grow by the
+/// loss ladder, which Bullet's engine turns on with the rates of the step's beginning.
+fn ladder_is_stable(omega2: f64, damping: f64, loss: f64, h: f64) -> bool {
+    // Rate times h, angle, q of each level.
+    let mut step = SMatrix::<f64, 7, 7>::identity();
+    let kick = h * h * omega2;
+    step[(0, 0)] -= h * damping * omega2;
+    step[(0, 1)] = -kick;
+    (2..7).for_each(|level| step[(0, level)] = -kick * loss);
+    let rate = step.row(0).into_owned();
+    let angle = step.row(1) + rate;
+    step.set_row(1, &angle);
+    for (level, time) in LOSS_TIMES.iter().enumerate() {
+        step[(level + 2, 0)] = 1.0;
+        step[(level + 2, level + 2)] = 1.0 - h / time;
+    }
+    step.complex_eigenvalues().iter().all(|value| value.norm() <= 1.0 + GROWTH)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::super::tests::robot;
+    use super::*;
+    use crate::engine::{BulletEngine, Engine};
+    use crate::model::{Extensions, Laminate, PointMass, StickSlip};
+
+    #[test]
+    fn one_joint_is_a_pendulum_on_a_spring() {
+        let robot = robot(1, 1, Mount::Clamped, 0.0);
+        // One box of half length and half mass behind the joint: I = M/2 (l²/3 + t²/12), l = L/2.
+        let mass = Laminate::new(&robot.material).actuator_mass / 2.0;
+        let inertia = mass * (25.0 / 3.0 + 0.01 / 12.0);
+        let omega = (robot.joint().stiffness / inertia).sqrt();
+        assert!((highest_joint_frequency(&robot) / omega - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_stable_step_has_its_limits_without_and_with_strong_damping() {
+        let free = robot(1, 3, Mount::Clamped, 0.0);
+        let omega = highest_joint_frequency(&free);
+        assert!((stable_step(&free) * omega - 2.0).abs() < 1e-12);
+        let damped = robot(1, 3, Mount::Clamped, 100.0);
+        assert!((stable_step(&damped) * damped.damping.time() * omega * omega - 2.0).abs() < 1e-3);
+    }
+
+    /// By the eigenvalues of the dense mass matrix, for every way to hold the robot and with masses on it.
+    #[test]
+    fn the_highest_frequency_is_that_of_the_dense_mass_matrix() {
+        for mount in [Mount::Clamped, Mount::Free, Mount::Ground] {
+            for points in [vec![], vec![PointMass { mass: 0.7, position: 13.0 }, PointMass { mass: 0.2, position: 20.0 }]] {
+                let mut robot = robot(2, 4, mount, 0.0);
+                robot.extensions.point_masses = points;
+                let (bodies, segments, joints) = (robot.rigid_bodies(), robot.segments(), robot.joints());
+                let mut mass = DMatrix::<f64>::zeros(joints + 2, joints + 2);
+                let (mut left, mut pivots) = (0.0, vec![0.0]);
+                for (body, segment) in bodies.iter().zip(&segments) {
+                    let centre = left + body.middle * segment.length;
+                    let mut lift = vec![1.0];
+                    lift.extend(pivots.iter().map(|pivot| centre - pivot));
+                    for row in 0..lift.len() {
+                        for column in 0..lift.len() {
+                            let turn = if row > 0 && column > 0 { body.inertia } else { 0.0 };
+                            mass[(row, column)] += body.mass * lift[row] * lift[column] + turn;
+                        }
+                    }
+                    left += segment.length;
+                    pivots.push(left);
+                }
+                let own = mass.view((2, 2), (joints, joints)).into_owned();
+                let coupling = mass.view((0, 2), (2, joints)).into_owned();
+                let base = mass.view((0, 0), (2, 2)).into_owned().try_inverse().unwrap();
+                let reduced = if mount == Mount::Clamped { own } else { own - coupling.transpose() * base * coupling };
+                let omega = (robot.joint().stiffness / reduced.symmetric_eigen().eigenvalues.min()).sqrt();
+                // The dense eigenvalue has lost four digits. Seen: at most 7e-13.
+                assert!((highest_joint_frequency(&robot) / omega - 1.0).abs() < 1e-10, "{mount:?}");
+            }
+        }
+    }
+
+    /// Largest rate (rad/s) later than a tenth of `steps` steps after a kick by the voltages of the first step.
+    fn later_rate(robot: &Robot, h: f64, steps: usize) -> f64 {
+        let mut engine = BulletEngine::new(robot, h).unwrap();
+        let on: Vec<f64> = (0..robot.actuators).map(|i| 1e-3 * (1.0 - 2.0 * (i % 2) as f64)).collect();
+        let mut largest = 0.0_f64;
+        for step in 0..steps {
+            let zeros = vec![0.0; robot.actuators];
+            if engine.prepare(if step == 0 { &on } else { &zeros }).is_err() {
+                return f64::INFINITY;
+            }
+            if step > steps / 10 {
+                largest = engine.joints().rates.iter().fold(largest, |largest, rate| largest.max(rate.abs()));
+            }
+            engine.advance().unwrap();
+        }
+        largest
+    }
+
+    /// What each effect does to stiffness, damping and masses moves the limit to where Bullet has it: 3 % below it a kick dies out, 3 % above it
+    /// grows until Bullet limits it (100 rad/s).
+    #[test]
+    fn bullet_is_stable_just_below_the_stable_step_and_not_above_it_with_every_effect() {
+        let base = Extensions::default();
+        let cases = [
+            ("plain", base.clone()),
+            ("damping", Extensions { damping_scale: 8.889, ..base.clone() }),
+            ("stiffness", Extensions { stiffness_scale: 3.0, ..base.clone() }),
+            ("mass", Extensions { mass_scale: 0.25, ..base.clone() }),
+            ("tip mass", Extensions { point_masses: vec![PointMass { mass: 5.0, position: 9.0 }], ..base.clone() }),
+            ("dry friction", Extensions { dry_friction: 100.0, ..base.clone() }),
+            ("loss", Extensions { loss: 0.2, ..base.clone() }),
+            ("clamp", Extensions { clamp_compliance: 1e-6, ..base }),
+        ];
+        for (name, extensions) in cases {
+            let mut robot = robot(1, 3, Mount::Clamped, 0.02);
+            robot.material.gravity = 0.0;
+            robot.extensions = extensions;
+            let h = stable_step(&robot);
+            let (below, above) = (later_rate(&robot, 0.97 * h, 3000), later_rate(&robot, 1.03 * h, 3000));
+            println!("{name}: {h:e} s, {below:e} rad/s below, {above:e} above");
+            // The clamp's constraint is solved to a residual of 1e-7, which leaves rates of 8e-4 rad/s.
+            // Dry friction is steep only at rest, so its alternation ends near its own rate.
+            let grown = if name == "dry friction" { 5e-3 } else { 10.0 };
+            assert!(below < 2e-3 && above > grown, "{name}: {below} {above} rad/s");
+        }
+    }
+
+    #[test]
+    fn hardening_shortens_the_step_with_bending_and_viscous_friction_only_on_the_floor() {
+        let mut bent = robot(1, 3, Mount::Clamped, 0.0);
+        bent.extensions.softening = -200.0;
+        // ω grows by √(1 + 3·200·0.05²).
+        assert!((stable_step(&bent) / stable_step_at(&bent, 0.05) - 2.5_f64.sqrt()).abs() < 1e-12);
+        let on = |mount: Mount, viscous: f64| {
+            let mut robot = robot(1, 3, mount, 0.0);
+            robot.extensions.stick_slip = StickSlip { viscous, ..StickSlip::OFF };
+            stable_step(&robot)
+        };
+        assert_eq!(on(Mount::Free, 1e7), on(Mount::Free, 0.0));
+        assert!(on(Mount::Ground, 1e7) < 0.1 * on(Mount::Ground, 0.0));
+    }
+
+    #[test]
+    fn ten_thousand_joints_take_no_longer_than_a_thousand_times_ten() {
+        let robot = robot(50, 200, Mount::Free, 0.045);
+        let start = std::time::Instant::now();
+        let h = stable_step(&robot);
+        // Seen: 10 ms; the eigenvalues of the dense matrix take minutes.
+        assert!(start.elapsed().as_secs_f64() < 2.0 && h > 0.0, "{:?}", start.elapsed());
+    }
+}
