@@ -33,12 +33,14 @@ fn steps_allocate_nothing() {
             let mut means = Means::new(&experiment.drive, experiment.robot.actuators, 0.0);
             let nodes = 3 * (experiment.robot.joints() + 2);
             let (mut positions, mut velocities) = (vec![0.0; nodes], vec![0.0; nodes]);
+            let mut places = vec![[0.0; 2]; nodes / 3];
             let mut steps = |count: u64| {
                 for _ in 0..count {
                     let time = robot.step() as f64 * experiment.time_step;
                     means.over(time, time + experiment.time_step, &mut voltages);
                     robot.prepare(&voltages).unwrap();
                     robot.nodes(&mut positions, &mut velocities).unwrap();
+                    robot.places(&mut places).unwrap();
                     robot.advance().unwrap();
                 }
             };

@@ -413,7 +413,11 @@ fn the_planar_engine_chooses_its_step_starts_settled_and_is_judged_by_bullet() {
         serde_json::from_slice(&output.stdout).unwrap()
     };
     let chosen = run(&["--set", "simulation.time_step_s=auto", "--set", "simulation.step_error=0.01"]);
-    assert!(chosen["step_choice"]["change"].as_f64().unwrap() <= 0.01, "{chosen}");
+    let choice = &chosen["step_choice"];
+    for change in [&choice["change"], &choice["halvings"][0], &choice["halvings"][1], &choice["to_an_eighth"]] {
+        assert!(change.as_f64().unwrap() <= 0.01, "{chosen}");
+    }
+    assert!(choice["other_friction"].is_null(), "a clamped robot touches nothing: {chosen}");
     assert_eq!(chosen["step_choice"]["time_step_s"], chosen["time_step_s"]);
     let settled = run(&["--set", "simulation.start=settled"]);
     assert!(settled["energy"]["kinetic_erg"].as_f64().unwrap() < 1e-12, "{settled}");
@@ -421,6 +425,15 @@ fn the_planar_engine_chooses_its_step_starts_settled_and_is_judged_by_bullet() {
 
     let judged = bench.sfers(&["crosscheck", "--engines", "a.toml", "--planar-step", "1e-5"]);
     assert!(judged.status.success() && out(&judged).contains("a.toml: agree"), "{}", out(&judged));
+    assert!(out(&judged).contains("errors of the steps"), "{}", out(&judged));
+
+    // The bodies are those of the file when the step is chosen: twice as long, they swing at a quarter of the frequency.
+    let long = bench.sfers(&["urdf", "a.toml", "--set", "material.actuator_length_mm=200"]);
+    fs::write(bench.path("long.urdf"), &long.stdout).unwrap();
+    let auto = ["--set", "simulation.time_step_s=auto", "--set", "simulation.step_error=0.01"];
+    let chosen = run(&[&auto[..], &["--robot", "long.urdf"]].concat());
+    assert!(chosen["step_choice"]["trials"].as_array().unwrap().len() > 3, "{chosen}");
+    assert_ne!(chosen["step_choice"]["trials"], run(&auto)["step_choice"]["trials"], "{chosen}");
 
     bench.refuses(&["run", "a.toml", "--engine", "plane"], 2, &["plane", "bullet, planar"]);
     bench.refuses(&["run", "a.toml", "--set", "simulation.time_step_s=auto"], 2, &["simulation.time_step_s", "planar"]);
@@ -428,4 +441,43 @@ fn the_planar_engine_chooses_its_step_starts_settled_and_is_judged_by_bullet() {
     bench.refuses(&["run", "a.toml", "--set", "simulation.friction=coulomb"], 2, &["simulation.friction", "planar"]);
     bench.refuses(&[&planar[..], &["--set", "simulation.time_step_s=0.01"]].concat(), 4, &["0.01 s", "at most"]);
     bench.refuses(&["crosscheck", "--engines", "a.toml", "--planar-step", "0"], 2, &["--planar-step"]);
+}
+
+/// Bullet limits velocities to 1 m/s, which a body that falls freely reaches after 0.1 s; the planar engine lets it fall 0.44 m further.
+#[test]
+fn engines_get_no_verdict_where_one_gives_no_measures() {
+    let bench = Bench::new(
+        "[robot]\nactuators = 1\nmount = \"free\"\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0]\n\
+         [simulation]\ntime_step_s = 1e-5\nduration_s = 0.4\n",
+    );
+    let judged = bench.sfers(&["crosscheck", "--engines", "a.toml", "--planar-step", "1e-5"]);
+    assert_eq!(judged.status.code(), Some(1), "{}", out(&judged));
+    for words in ["a.toml: no verdict", "warning, Bullet: Bullet limited a velocity", "Bullet gives no measures"] {
+        assert!(out(&judged).contains(words), "{words}: {}", out(&judged));
+    }
+    let json = bench.sfers(&["crosscheck", "--engines", "a.toml", "--planar-step", "1e-5", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    let report = &json["comparisons"][0]["report"];
+    assert_eq!((&json["passes"], &report["verdict"]), (&false.into(), &"no verdict".into()), "{json}");
+    assert!(report["warnings"][0][0].as_str().unwrap().contains("limited a velocity"), "{json}");
+    assert_eq!(report["warnings"][1], serde_json::json!([]), "{json}");
+}
+
+#[test]
+fn a_spectrum_of_too_few_records_says_so() {
+    let sine = CANTILEVER
+        .replace("waveform = \"dc\"\nvoltages_v = [-1000]", "waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 20")
+        .replace("time_step_s = 1e-5\nsteps = 200\nrecord_every_steps = 50", "time_step_s = 1e-4\nduration_s = 0.3");
+    let bench = Bench::new(&sine);
+    for (interval, words) in
+        [("1e-3", ""), ("1e-2", "harmonics of the drive from number 3"), ("0.03", "the drive (20.0000 Hz) is above")]
+    {
+        let record = format!("simulation.record_every_s={interval}");
+        let run = ["run", "a.toml", "--out", "a.npz", "--engine", "planar"];
+        let done = bench.sfers(&[&run[..], &["--set", &record]].concat());
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let drawn = bench.sfers(&["plot", "a.npz", "--kind", "spectrum", "--out", "a.svg", "--quiet"]);
+        let told = String::from_utf8_lossy(&drawn.stderr);
+        assert!(drawn.status.success() && told.contains(words) && told.is_empty() == words.is_empty(), "{interval}: {told}");
+    }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use sfers::analytic;
 use sfers::engine::{Engine, FrictionModel, PlanarEngine};
-use sfers::experiment::{self, Control, Experiment, Run, Source, presets};
+use sfers::experiment::{self, ConfigError, Control, Experiment, Run, Source, presets};
 use sfers::recording::measures::Measures;
 
 fn experiment_of(text: &str, settings: &[&str]) -> Experiment {
@@ -501,11 +501,56 @@ fn the_automatic_step_keeps_its_promise() {
         assert!(choice.change <= error && choice.time_step_s == automatic.time_step, "{choice:?}");
         let fine =
             preset(name, &[&format!("simulation.time_step_s={}", automatic.time_step / 16.0), "simulation.duration_s=0.2"]);
-        let of = |e: &Experiment| Measures::of(&run(e).recording, e.robot.mount, e.drive.period()).get(measure).unwrap();
+        let of = |e: &Experiment| run(e).measures.get(measure).unwrap();
         let (a, b) = (of(&automatic), of(&fine));
         // A first-order error is as large as the last change.
         assert!((a / b - 1.0).abs() < 2.0 * error, "{name}: {a} {b}, {choice:?}");
     }
+}
+
+/// Films of friction 4 under both ends: with steps from 10⁻³ to 6·10⁻⁵ s halvings change the sum of displacements by 1 % (Coulomb) and 3 %
+/// (convex), but with 10⁻⁶ s it is twice as large.
+#[test]
+fn no_step_is_promised_on_a_false_plateau() {
+    for (friction, delay, error) in
+        [("coulomb", "0.08", "0.05"), ("coulomb", "0.065", "0.02"), ("convex", "0.08", "0.05"), ("convex", "0.065", "0.001")]
+    {
+        let mut source = Source::from_text("mover", presets::find("mover-three-phase").unwrap().text);
+        for setting in [
+            "simulation.engine=planar",
+            "simulation.time_step_s=auto",
+            "simulation.step_measure=displacement_sum_mm",
+            "robot.friction.low=0.2",
+            "robot.friction.film_fraction=0.6666666666666666",
+            &format!("simulation.friction={friction}"),
+            &format!("simulation.step_error={error}"),
+            &format!("drive.delay_s={delay}"),
+        ] {
+            source.set(setting).unwrap();
+        }
+        match experiment::experiment(&source) {
+            Err(ConfigError::NotConverged(told)) => {
+                assert!(told.contains("displacement_sum_mm is not converged") && told.contains("e-3 s "), "{told}");
+                assert!(told.contains(&format!("friction = \"{friction}\"")), "{told}");
+            }
+            Err(other) => panic!("{other}"),
+            Ok(chosen) => {
+                // As measured with Coulomb's law at 10⁻⁶ s, and on Bullet: 6.40 with a delay of 65 ms.
+                let truth = if delay == "0.08" { 5.93 } else { 6.45 };
+                let found = run(&chosen).measures.displacement_sum_mm.unwrap();
+                let error: f64 = error.parse().unwrap();
+                assert!(
+                    (found / truth - 1.0).abs() < 2.0 * error,
+                    "{friction} {delay} {error}: {found}, {:?}",
+                    chosen.step_choice
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_automatic_step_that_cannot_be_is_refused() {
     let text = presets::find("jump-14hz").unwrap().text;
     for bad in [
         &["simulation.time_step_s=auto"][..],

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::output::{finish, pending};
-use super::{Failure, Options, print};
+use super::{Failure, Options, print, say};
 use crate::recording::{Recording, csv, npz};
 use crate::view::{self, Figure, Kind, ResultsError, Size, View};
 
@@ -96,7 +96,12 @@ fn figure(args: &Args, options: Options) -> Result<Figure, Failure> {
                 let reason = "--measure, --where and --by choose from results of a sweep, and this is a recording";
                 return Err(Failure::Usage(format!("{}: {reason}", args.input.display())));
             }
-            Ok(args.kind.titled(&name(&args.input), &recording(&args.input, options)?))
+            let recording = recording(&args.input, options)?;
+            if let (Kind::Spectrum, Some(problem)) = (args.kind, view::aliased(&recording)) {
+                // Even when quiet: what is drawn is not what moved.
+                say(&format!("warning: {problem}"));
+            }
+            Ok(args.kind.titled(&name(&args.input), &recording))
         }
         "csv" => {
             let data = |reason: String| Failure::Data(format!("{}: {reason}", args.input.display()));

@@ -79,15 +79,18 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         }
         source.push(Setting { key: key.into(), value: engine.clone(), place: format!("--engine {engine}") });
     }
-    let mut experiment = experiment::experiment(&source)?;
-    if let Some(path) = &args.robot {
-        if path == Path::new("-") && args.experiment == path.as_path() {
-            return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
+    let experiment = match &args.robot {
+        None => experiment::experiment(&source)?,
+        Some(path) => {
+            if path == Path::new("-") && args.experiment == path.as_path() {
+                return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
+            }
+            let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
+            let text = read(path).map_err(|error| bad(error.to_string()))?;
+            let bodies = export::bodies(&text, &experiment::check(&source)?.robot).map_err(|error| bad(error.to_string()))?;
+            experiment::with_bodies(&source, &bodies)?
         }
-        let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
-        let text = read(path).map_err(|error| bad(error.to_string()))?;
-        experiment.robot.bodies = Some(export::bodies(&text, &experiment.robot).map_err(|error| bad(error.to_string()))?);
-    }
+    };
     let output = args.out.as_deref().map(Output::open).transpose()?;
     let state_file = args.save_state.as_deref().map(pending).transpose()?;
     let mut engine = experiment.engine()?;
@@ -97,9 +100,11 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
 
     let mut warnings = Vec::new();
     if let Some(choice) = &experiment.step_choice {
+        let friction = if choice.other_friction.is_some() { ", and with the other friction model" } else { "" };
         options.remark(&format!(
-            "time step {:.3e} s: from twice that, the {} of the first {} s changes by {:.1e} (allowed {:.0e})",
-            choice.time_step_s, choice.measure, choice.stretch_s, choice.change, choice.asked
+            "time step {:.3e} s: the {} of the whole run changes by at most {:.1e} (allowed {:.0e}) in two halvings to it, to an eighth of \
+             it{friction}",
+            choice.time_step_s, choice.measure, choice.change, choice.asked
         ));
     }
     // Said before the run, which may take long; the run itself says it again, with its measures left out.
@@ -130,7 +135,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
     let remarks = run.warnings(&experiment);
     remarks.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let Run { mut recording, interrupted, energy, audited, .. } = run;
+    let Run { mut recording, measures, interrupted, energy, audited, .. } = run;
     let steps = recording.meta.steps;
     if interrupted {
         let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
@@ -142,13 +147,9 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         ground.date_time = now().of_the_reference();
     }
 
-    let measures = if trouble.is_empty() {
-        Measures::of(&recording, experiment.robot.mount, experiment.drive.period())
-    } else {
-        Measures::default()
-    };
+    let measures =
+        if trouble.is_empty() { measures } else { Measures { energy_error: measures.energy_error, ..Measures::default() } };
     warnings.extend(trouble.into_iter().chain(remarks));
-    let measures = Measures { energy_error: audited.then(|| energy.error()), ..measures };
     let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
     let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);

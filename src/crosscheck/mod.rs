@@ -11,7 +11,7 @@ mod python;
 
 pub use builtin::{BUILTIN, Builtin};
 pub use compare::{Difference, FAR, Quantity, Report, compare};
-pub use engines::{ENGINE_SET, EngineReport, MeasurePair, PARTED, Parting, compare_engines};
+pub use engines::{ENGINE_SET, EngineReport, EngineVerdict, MeasurePair, PARTED, Parting, compare_engines};
 pub use python::{AuthorsRun, CrosscheckError, Versions, authors_run, run_authors, run_pybullet};
 
 /// How far positions of nodes may differ (cm), for robots up to 50 cm long, the reference's size; in proportion beyond.

@@ -10,7 +10,6 @@ use super::{names, report, robot};
 use crate::experiment::{self, Config, ConfigError, Control, EffectConfig, Source};
 use crate::model::Mount;
 use crate::recording::definitions;
-use crate::recording::measures::Measures;
 use crate::view::page::{Cell, Table, document};
 use crate::view::{digits_for, escape, fixed, label_of, signed};
 use crate::words;
@@ -176,8 +175,7 @@ impl Plant for Numbers<'_> {
             experiment::experiment(&Source::from_text(&observation.measure, text)).map_err(|error| error.to_string())?;
         let mut engine = experiment.engine().map_err(|error| error.to_string())?;
         let done = experiment::run(&experiment, engine.as_mut(), |_| Control::Continue).map_err(|error| error.to_string())?;
-        let measures = Measures::of(&done.recording, experiment.robot.mount, experiment.drive.period());
-        let value = measures.get(&observation.measure);
+        let value = done.measures.get(&observation.measure);
         Ok(vec![value.ok_or_else(|| format!("{} cannot be had from its drive", observation.measure))?])
     }
 }

@@ -61,6 +61,14 @@ impl Engine for AffectedEngine {
         self.engine.correct_velocities(velocities)
     }
 
+    fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError> {
+        self.engine.places(nodes)
+    }
+
+    fn motor_voltages(&self) -> &[f64] {
+        self.engine.motor_voltages()
+    }
+
     fn base(&mut self) -> Result<PlanarBase, EngineError> {
         self.engine.base()
     }

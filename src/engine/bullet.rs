@@ -159,6 +159,36 @@ impl BulletEngine {
         Ok(())
     }
 
+    /// Reads the links' boxes, and the base's, which must be numbers.
+    fn read_bodies(&mut self) -> Result<BaseState, EngineError> {
+        let base = self.base_state()?;
+        if let Some(&value) = base.position.iter().chain(&base.velocity).find(|v| !v.is_finite()) {
+            return Err(self.not_finite("the base's position or velocity".into(), value));
+        }
+        self.read_links()?;
+        Ok(base)
+    }
+
+    /// Calls `put` with number and place (cm) of every node, with the links as they were read; returns the pitch of the last body.
+    fn place_nodes(&self, base: &BaseState, mut put: impl FnMut(usize, [f64; 3])) -> f64 {
+        let p = base_pitch(base);
+        let lever = 0.5 * self.lengths[0];
+        put(0, [base.position[0] - lever * p.cos(), 0.0, base.position[2] + lever * p.sin()]);
+        let mut joint = [0.0; 3];
+        for (i, link) in self.links.iter().enumerate() {
+            // The joint stands half the link's length before its centre of mass, along the link's x axis.
+            let to_com = 0.5 * self.lengths[i + 1];
+            joint = std::array::from_fn(|axis| link.position[axis] - link.rotation[axis][0] * to_com);
+            put(i + 1, joint);
+        }
+        let joints = self.links.len();
+        let last = &self.links[joints - 1];
+        let p = pitch([last.rotation[0][0], last.rotation[1][0], last.rotation[2][0]]);
+        let length = self.lengths[joints];
+        put(joints + 1, [joint[0] + length * p.cos(), 0.0, joint[2] - length * p.sin()]);
+        p
+    }
+
     /// Drag, viscous friction and the coefficients of friction of the coming step.
     fn meet_surroundings(&mut self) -> Result<(), EngineError> {
         if self.air.is_none() && self.sliding.is_none() {
@@ -359,42 +389,26 @@ impl Engine for BulletEngine {
     /// that Bullet cached one step earlier. Velocities pair the joints' places with the velocities of the links' centres of mass,
     /// and the right end's takes a whole length of the last body as lever from there. All of this is how the reference records.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
-        let base = self.base_state()?;
-        if let Some(&value) = base.position.iter().chain(&base.velocity).find(|v| !v.is_finite()) {
-            return Err(self.not_finite("the base's position or velocity".into(), value));
-        }
-        self.read_links()?;
+        let base = self.read_bodies()?;
+        let last = self.place_nodes(&base, |node, place| positions[3 * node..3 * node + 3].copy_from_slice(&place));
         let p = base_pitch(&base);
         let lever = 0.5 * self.lengths[0];
         let rate = base.angular_velocity[1];
-        positions[..3].copy_from_slice(&[base.position[0] - lever * p.cos(), 0.0, base.position[2] + lever * p.sin()]);
         velocities[..3].copy_from_slice(&[
             base.velocity[0] + lever * p.sin() * rate,
             0.0,
             base.velocity[2] + lever * p.cos() * rate,
         ]);
-
-        let joints = self.links.len();
         for (i, link) in self.links.iter().enumerate() {
-            // The joint stands half the link's length before its centre of mass, along the link's x axis.
-            let to_com = 0.5 * self.lengths[i + 1];
-            for axis in 0..3 {
-                positions[3 * (i + 1) + axis] = link.position[axis] - link.rotation[axis][0] * to_com;
-                velocities[3 * (i + 1) + axis] = link.velocity[axis];
-            }
+            velocities[3 * (i + 1)..3 * (i + 2)].copy_from_slice(&link.velocity);
         }
-
-        let last = &self.links[joints - 1];
-        let p = pitch([last.rotation[0][0], last.rotation[1][0], last.rotation[2][0]]);
-        let length = self.lengths[joints];
-        let rate = last.angular_velocity[1];
-        let joint = [positions[3 * joints], 0.0, positions[3 * joints + 2]];
-        let end = 3 * (joints + 1);
-        positions[end..end + 3].copy_from_slice(&[joint[0] + length * p.cos(), 0.0, joint[2] - length * p.sin()]);
-        velocities[end..end + 3].copy_from_slice(&[
-            last.velocity[0] - length * p.sin() * rate,
+        let joints = self.links.len();
+        let LinkState { velocity, angular_velocity, .. } = &self.links[joints - 1];
+        let (length, rate) = (self.lengths[joints], angular_velocity[1]);
+        velocities[3 * (joints + 1)..3 * (joints + 2)].copy_from_slice(&[
+            velocity[0] - length * last.sin() * rate,
             0.0,
-            last.velocity[2] - length * p.cos() * rate,
+            velocity[2] - length * last.cos() * rate,
         ]);
         Ok(())
     }
@@ -416,6 +430,16 @@ impl Engine for BulletEngine {
             node.copy_from_slice(&[velocity[0], 0.0, velocity[1]]);
         }
         Ok(())
+    }
+
+    fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError> {
+        let base = self.read_bodies()?;
+        self.place_nodes(&base, |node, [x, _, z]| nodes[node] = [x, z]);
+        Ok(())
+    }
+
+    fn motor_voltages(&self) -> &[f64] {
+        &self.state.motor_voltages
     }
 
     fn base(&mut self) -> Result<PlanarBase, EngineError> {

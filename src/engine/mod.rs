@@ -213,6 +213,15 @@ pub trait Engine {
         Ok(())
     }
 
+    /// Places of the nodes alone, x and z (cm), at little cost: for what is followed at every step.
+    ///
+    /// # Errors
+    /// As [`nodes`](Self::nodes).
+    fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError>;
+
+    /// Voltages on the joints (V) since [`prepare`](Self::prepare).
+    fn motor_voltages(&self) -> &[f64];
+
     /// Pose and velocity of the base in the plane of motion.
     ///
     /// # Errors

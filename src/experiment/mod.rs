@@ -12,7 +12,7 @@ mod state;
 
 #[cfg(test)]
 pub(crate) use auto::DEFAULT_STEP_ERROR;
-pub use auto::StepChoice;
+pub use auto::{StepChoice, StepTrial};
 pub(crate) use config::line_of;
 pub use config::{
     Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, Setting,
@@ -20,7 +20,7 @@ pub use config::{
 };
 pub use range::Bending;
 pub(crate) use range::{step_too_long, unstable};
-pub use resolve::{check, experiment};
+pub use resolve::{check, experiment, with_bodies};
 pub(crate) use run::hermite;
 pub use run::{Control, Run, run};
 pub use state::SavedState;

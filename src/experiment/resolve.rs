@@ -11,7 +11,7 @@ use crate::engine::FrictionModel;
 use crate::model::units::{
     ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2, v_per_cm_from_kv_per_mm,
 };
-use crate::model::{Damping, Extensions, Film, Friction, Material, ModelError, Mount, Robot};
+use crate::model::{Damping, Extensions, Film, Friction, Material, ModelError, Mount, Robot, Segment};
 use crate::recording::MAX_VALUES;
 use crate::words::{not_one_of, number};
 
@@ -38,7 +38,16 @@ impl From<Fault> for Trouble {
 /// # Errors
 /// [`ConfigError`] with file, line and key.
 pub fn experiment(source: &Source) -> Result<Experiment, ConfigError> {
-    read(source, true)
+    read(source, true, None)
+}
+
+/// Reads an experiment of a robot whose `bodies` come from elsewhere, as [`export::bodies`](crate::export::bodies) reads them; a time step that is
+/// to be chosen is chosen for that robot.
+///
+/// # Errors
+/// As [`experiment()`].
+pub fn with_bodies(source: &Source, bodies: &[Segment]) -> Result<Experiment, ConfigError> {
+    read(source, true, Some(bodies))
 }
 
 /// Reads an experiment without the trial runs that `time_step_s = "auto"` asks for: to see whether it makes sense.
@@ -46,18 +55,18 @@ pub fn experiment(source: &Source) -> Result<Experiment, ConfigError> {
 /// # Errors
 /// As [`experiment()`].
 pub fn check(source: &Source) -> Result<Experiment, ConfigError> {
-    read(source, false)
+    read(source, false, None)
 }
 
-fn read(source: &Source, trials: bool) -> Result<Experiment, ConfigError> {
+fn read(source: &Source, trials: bool, bodies: Option<&[Segment]>) -> Result<Experiment, ConfigError> {
     let config = source.parse()?;
-    resolve(&config, &source.folder, trials).map_err(|trouble| match trouble {
+    resolve(&config, &source.folder, trials, bodies).map_err(|trouble| match trouble {
         Trouble::Fault(fault) => source.locate(fault),
         Trouble::Config(error) => error,
     })
 }
 
-fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, Trouble> {
+fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segment]>) -> Result<Experiment, Trouble> {
     let mut robot = robot(config)?;
     let effects = effects(config)?;
     if let Some(joints) = effects::joints(&effects) {
@@ -97,7 +106,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
         if engine == EngineKind::Bullet {
             return Err(Fault::new("simulation.time_step_s", "auto needs engine = \"planar\"").into());
         }
-        return auto::choose(config, &robot, trials, |config| resolve(config, folder, trials));
+        return auto::choose(config, &robot, trials, |config| resolve(config, folder, trials, bodies));
     }
     for (key, given) in [("step_error", s.step_error.is_some()), ("step_measure", s.step_measure.is_some())] {
         if given {
@@ -114,6 +123,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool) -> Result<Experiment, T
     let waveform = waveform(&config.drive, &robot, first, folder)?;
     let mut drive = Drive { waveform, positive_gain: robot.positive_gain, delay: 0.0 };
     effects::apply(&effects, &mut robot, &mut drive).map_err(|error| Fault::new("effect", error.to_string()))?;
+    robot.bodies = bodies.map(<[Segment]>::to_vec);
     Ok(Experiment {
         robot,
         drive,

@@ -2,10 +2,13 @@
 
 use super::Experiment;
 use super::range::{self, Bending, CLEARLY, UNSETTLED_TROUBLE};
+use crate::analytic;
 use crate::drive::{Means, Waveform};
 use crate::effects::View;
 use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError, Unsettled};
 use crate::recording::Recording;
+use crate::recording::follow::{Course, Follower};
+use crate::recording::measures::{Measures, recorded_jump_height};
 
 /// Steps between two calls of the observer: often enough for a progress bar, too rare to cost anything.
 const OBSERVE_EVERY: u64 = 256;
@@ -14,6 +17,9 @@ const OBSERVE_EVERY_JOINTS: u64 = 1 << 14;
 /// Steps between two readings of the joint angles for [`Bending`], of an engine that computes them on demand: 6 ms of steps of 0.1 ms. On Bullet,
 /// which reads them anyway, every step counts, and on both every record.
 const BEND_EVERY_MIDPOINT: u64 = 64;
+
+/// Samples that measures are taken of in a period of the drive, and in one of an actuator's first mode.
+const SAMPLES: f64 = 100.0;
 
 /// What the observer of a run decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +35,9 @@ pub enum Control {
 pub struct Run {
     /// What was recorded.
     pub recording: Recording,
+    /// Measures of every step, seen as the effects make them seen. Of an interrupted run those are absent that belong to its end. If the run has
+    /// [`trouble`](Self::trouble) they are those of another robot.
+    pub measures: Measures,
     /// Whether the observer stopped the run before its end.
     pub interrupted: bool,
     /// Whether the engine had to limit velocities.
@@ -108,8 +117,12 @@ pub fn run(
     let observe_every = (OBSERVE_EVERY_JOINTS / experiment.robot.joints().max(1) as u64).clamp(1, OBSERVE_EVERY);
     let bend_every = if midpoint { BEND_EVERY_MIDPOINT } else { 1 };
     let mut bending = Bending::default();
+    let view = View::new(&experiment.effects);
+    let origin = -0.5 * experiment.robot.segments()[0].length;
     let mut interrupted = false;
     let mut done = engine.step();
+    let start = done;
+    let (mut follower, every) = follower(experiment, start);
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
     let mut means = Means::new(&experiment.drive, experiment.robot.actuators, done as f64 * experiment.time_step);
     while done < experiment.steps {
@@ -136,6 +149,10 @@ pub fn run(
         if let Some(books) = &mut books {
             books.take(engine)?;
         }
+        let regular = (done - start).is_multiple_of(every) || done + 1 == experiment.steps;
+        if regular || follower.is_close() {
+            follow(&mut follower, time, regular, engine, (&view, origin))?;
+        }
         if experiment.records(done) {
             recorder.record(time, engine)?;
             bending.take(recorder.last_angles(), time);
@@ -147,10 +164,15 @@ pub fn run(
     }
     let mut recording = recorder.recording;
     recording.meta = experiment.meta(done, String::new());
-    see(&mut recording, &View::new(&experiment.effects), -0.5 * experiment.robot.segments()[0].length);
+    see(&mut recording, &view, origin);
     let energy = books.as_ref().map(Books::balance);
+    let mut measures = Measures { energy_error: energy.map(|energy| energy.error()), ..follower.measures() };
+    if measures.jump_height_mm.is_some() {
+        measures.recorded_jump_height_mm = Some(recorded_jump_height(&recording));
+    }
     Ok(Run {
         recording,
+        measures,
         interrupted,
         clamp_hits: engine.clamp_hits(),
         unstable: range::unstable(experiment, engine.hardening_curvature()),
@@ -159,6 +181,49 @@ pub fn run(
         bending,
         energy: energy.unwrap_or_default(),
     })
+}
+
+/// What follows a run from step `start` on: the states before its steps, as a recording of all of them would hold them. And the number of
+/// steps from one regular sample to the next.
+fn follower(experiment: &Experiment, start: u64) -> (Follower, u64) {
+    let (robot, h) = (&experiment.robot, experiment.time_step);
+    let period = experiment.drive.period();
+    let first_mode = analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2);
+    let spacing = period.unwrap_or(f64::INFINITY).min(1.0 / first_mode) / SAMPLES;
+    let every = (spacing / h).max(1.0) as u64;
+    let last = experiment.steps.saturating_sub(1).max(start);
+    let course = Course {
+        mount: robot.mount,
+        nodes: robot.joints() + 2,
+        period,
+        first: start as f64 * h,
+        last: last as f64 * h,
+        samples: ((last - start) / every + 2) as usize,
+        spacing: if every > 1 { every as f64 * h } else { 0.0 },
+    };
+    (Follower::new(course), every)
+}
+
+/// Shows the robot at `time` (s) to the follower, as it is seen.
+fn follow(
+    follower: &mut Follower,
+    time: f64,
+    regular: bool,
+    engine: &mut dyn Engine,
+    (view, origin): (&View, f64),
+) -> Result<(), EngineError> {
+    follower.voltages(time, engine.motor_voltages());
+    engine.places(follower.places())?;
+    if !view.is_plain() {
+        follower.places().iter_mut().for_each(|[x, z]| [*x, *z] = view.of([*x - origin, *z]));
+        if view.delay > 0.0 && follower.is_new() {
+            // Before the first state the robot stood as in it.
+            follower.take(time, true);
+            return follow(follower, time, regular, engine, (view, origin));
+        }
+    }
+    follower.take(time + view.delay, regular);
+    Ok(())
 }
 
 /// Turns the recorded places of the nodes into what is seen of them, scaled and rolled about the left end of the flat robot at x = `origin` (cm);

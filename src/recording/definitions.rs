@@ -20,8 +20,8 @@ const GROUND: &str = "robots on the ground";
 
 /// What the definitions have in common.
 pub const CONVENTIONS: &str = "x and z are those of the nodes: both ends and the joints, x along the flat robot and z upwards from it. The \
-    last period is the last whole period of the drive; the last half of the run, in whole periods, stands for the settled state. A measure that \
-    makes no sense for a run is absent, and no measure is given where the simulation went wrong.";
+    last period is the last whole period of the drive; the last half of the run, in whole periods, stands for the settled state. Measures \
+    are those of the run's steps, however densely it is recorded, but for what is called recorded. A measure that makes no sense for a run is absent, and no measure is given where the simulation went wrong.";
 
 /// All measures, in the order in which they are printed.
 pub static DEFINITIONS: &[Definition] = &[
@@ -48,6 +48,11 @@ pub static DEFINITIONS: &[Definition] = &[
         "width of that mode's peak at 1/√2 of its height: 2ζ times its undamped frequency",
     ),
     define("jump_height_mm", MOBILE, "max over time of min over nodes of z: height of the lowest point at its best"),
+    define(
+        "recorded_jump_height_mm",
+        MOBILE,
+        "the same of the records alone, which may miss the moment: what a curve shows that was drawn from records, as the authors' are",
+    ),
     define("stride_mm", MOBILE_PERIODIC, "travel of the nodes' mean x during the last period"),
     define(
         "speed_mm_s",

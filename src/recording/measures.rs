@@ -3,19 +3,17 @@
 use serde::Serialize;
 
 use super::Recording;
-use super::signal::{Harmonic, Mode, phase_difference_deg, repetition};
+use super::follow::{Course, Follower};
 use crate::model::Mount;
 use crate::model::units::mm_from_cm;
 
 /// Clearance (cm) below which a node touches the floor: a tenth of the collision box's thickness or so, and far above the penetration
 /// of resting contact (measured: 10⁻⁴ cm).
 const TOUCHING: f64 = 0.005;
-/// Largest [`repetition`] that still counts as the same motion. Measured at 14 Hz: 0.01 to 0.1 after two periods, 0.6 after one.
-const SAME: f64 = 0.2;
-/// Voltages within this share of their travel from the last one stand still: a jump with 5 % of creep does.
-const STILL: f64 = 0.1;
-
 /// Measures of one run; those that make no sense for its mount or drive are absent.
+///
+/// A run follows its robot at every step, so that its measures do not depend on how densely it is recorded; only what is called
+/// `recorded` does. A period that begins between two steps begins on the straight line between them.
 ///
 /// "The last period" is the last whole period of the drive; the last half of the run, in whole periods, is taken for what needs a settled
 /// state. x and z are those of the nodes.
@@ -45,6 +43,9 @@ pub struct Measures {
     /// Height of the lowest point at its best: max over time of min over nodes of z (mm). Robots that are not clamped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jump_height_mm: Option<f64>,
+    /// The same of the records alone, which may miss the moment (mm): what a curve shows that was drawn from records, as the authors' are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded_jump_height_mm: Option<f64>,
     /// Travel of the nodes' mean x during the last period (mm). Robots that are not clamped, with a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stride_mm: Option<f64>,
@@ -55,7 +56,7 @@ pub struct Measures {
     /// Max over time of the left end's plus the right end's travel along x (mm). Robots that are not clamped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub displacement_sum_mm: Option<f64>,
-    /// Periods of the drive after which the nodes' heights repeat, by [`repetition`] below 0.2 over the last half of the run in pairs of
+    /// Periods of the drive after which the nodes' heights repeat, by [`Repetition`](super::signal::Repetition) below 0.2 over the last half of the run in pairs of
     /// periods: 1, 2, or 0 for neither (–). Robots that are not clamped, with a period, in runs of six periods or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_ratio: Option<f64>,
@@ -91,86 +92,63 @@ pub enum ContactState {
 
 /// How the robot touches the floor in each record. A node touches if it is less than 0.05 mm above its height on the flat robot.
 pub fn contact_states(recording: &Recording) -> Vec<ContactState> {
-    let nodes = recording.nodes();
-    let touches = |record: usize, node: usize| recording.node(record, node)[2] < TOUCHING;
-    (0..recording.len())
-        .map(|record| {
-            if (2..nodes.saturating_sub(2)).any(|node| touches(record, node)) {
-                ContactState::BodyTouching
-            } else if (0..nodes).any(|node| touches(record, node)) {
-                ContactState::EndTouching
-            } else {
-                ContactState::Aerial
-            }
-        })
-        .collect()
+    let mut nodes = vec![[0.0; 2]; recording.nodes()];
+    let state = |record| {
+        copy_nodes(recording, record, &mut nodes);
+        contact_state(&nodes).0
+    };
+    (0..recording.len()).map(state).collect()
+}
+
+/// The state of contact of nodes at x and z (cm), and the height of the lowest (cm).
+pub(super) fn contact_state(nodes: &[[f64; 2]]) -> (ContactState, f64) {
+    let lowest = |nodes: &[[f64; 2]]| nodes.iter().fold(f64::INFINITY, |low, &[_, z]| if z < low { z } else { low });
+    let inner = 2..nodes.len().saturating_sub(2);
+    let body = nodes.get(inner.clone()).map_or(f64::INFINITY, lowest);
+    let ends = lowest(&nodes[..2.min(nodes.len())]).min(lowest(&nodes[inner.end..]));
+    let state = if body < TOUCHING {
+        ContactState::BodyTouching
+    } else if ends < TOUCHING {
+        ContactState::EndTouching
+    } else {
+        ContactState::Aerial
+    };
+    (state, body.min(ends))
+}
+
+/// Writes x and z (cm) of the nodes of a record.
+fn copy_nodes(recording: &Recording, record: usize, to: &mut [[f64; 2]]) {
+    for (node, to) in to.iter_mut().enumerate() {
+        let [x, _, z] = recording.node(record, node);
+        *to = [x, z];
+    }
+}
+
+/// Largest height (mm) of the lowest node in the records.
+pub(crate) fn recorded_jump_height(recording: &Recording) -> f64 {
+    let z = |record: usize, node: usize| recording.node(record, node)[2];
+    let lowest = |record: usize| (0..recording.nodes()).map(|node| z(record, node)).fold(f64::INFINITY, f64::min);
+    mm_from_cm((0..recording.len()).map(lowest).fold(f64::NEG_INFINITY, f64::max))
 }
 
 impl Measures {
-    /// Takes the measures of `recording`. `period` (s) is the drive's, if it repeats.
+    /// Takes the measures of a `recording` of others: all that happened between its records is unknown here, and a run's own measures,
+    /// [`Run::measures`](crate::experiment::Run), are those to use where there are such. `period` (s) is the drive's, if it repeats.
     pub fn of(recording: &Recording, mount: Mount, period: Option<f64>) -> Self {
-        if recording.len() < 2 {
-            return Self::default();
+        let (Some(&first), Some(&last)) = (recording.time.first(), recording.time.last()) else { return Self::default() };
+        let samples = recording.len();
+        let course = Course { mount, nodes: recording.nodes(), period, first, last, samples, spacing: 0.0 };
+        let mut follower = Follower::new(course);
+        for (record, &time) in recording.time.iter().enumerate() {
+            copy_nodes(recording, record, follower.places());
+            follower.take(time, true);
+            if let Some(volts) = recording.motor_voltages.chunks_exact(recording.joints().max(1)).nth(record) {
+                follower.voltages(time, volts);
+            }
         }
-        let period = period.filter(|&period| period > 0.0);
-        match mount {
-            Mount::Clamped => Self::of_clamped(recording, period),
-            Mount::Ground | Mount::Free => Self::of_mobile(recording, period, mount == Mount::Ground),
-        }
-    }
-
-    fn of_clamped(recording: &Recording, period: Option<f64>) -> Self {
-        let tip: Vec<f64> = (0..recording.len()).map(|record| z_mm(recording, record, recording.nodes() - 1)).collect();
-        let last = tip.len() - 1;
-        let from = period.and_then(|period| periods_before_end(recording, period, 1)).unwrap_or(0);
-        let (low, high) =
-            tip[from..].iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &z| (low.min(z), high.max(z)));
-        let mut measures =
-            Self { tip_deflection_mm: Some(tip[last]), tip_amplitude_mm: Some((high - low) / 2.0), ..Self::default() };
-        if let Some(period) = period {
-            let volts: Vec<f64> = recording.motor_voltages.iter().step_by(recording.joints()).copied().collect();
-            measures.tip_phase_deg = phase_between(recording, &tip, &volts, period);
-        } else if let Some(mode) = still_from(recording).and_then(|from| Mode::of_ringing(&recording.time[from..], &tip[from..]))
-        {
-            measures.resonance_hz = Some(mode.resonance_hz);
-            measures.damping_ratio = Some(mode.damping_ratio);
-            measures.half_power_bandwidth_hz = Some(mode.half_power_bandwidth_hz);
-        }
-        measures
-    }
-
-    fn of_mobile(recording: &Recording, period: Option<f64>, ground: bool) -> Self {
-        let (records, nodes) = (recording.len(), recording.nodes());
-        let last = records - 1;
-        let lowest = |record: usize| (0..nodes).map(|node| z_mm(recording, record, node)).fold(f64::INFINITY, f64::min);
-        let mean_x = |record: usize| (0..nodes).map(|node| recording.node(record, node)[0]).sum::<f64>() / nodes as f64;
-        let travel = |from: usize| mm_from_cm(mean_x(last) - mean_x(from));
-        let ends_x = |record: usize| recording.node(record, 0)[0] + recording.node(record, nodes - 1)[0];
-        let mut measures = Self {
-            jump_height_mm: Some((0..records).map(lowest).fold(f64::NEG_INFINITY, f64::max)),
-            displacement_sum_mm: Some((0..records).map(|r| mm_from_cm(ends_x(r) - ends_x(0))).fold(f64::NEG_INFINITY, f64::max)),
-            ..Self::default()
-        };
-        let from = match period {
-            Some(period) => half_run(recording, period),
-            None => Some(0),
-        };
-        measures.speed_mm_s =
-            from.map(|from| travel(from) / (recording.time[last] - recording.time[from])).filter(|speed| speed.is_finite());
-        if let Some(period) = period {
-            measures.stride_mm = periods_before_end(recording, period, 1).map(travel);
-            measures.period_ratio = period_ratio(recording, period);
-            let height = |node: usize| (0..records).map(|r| z_mm(recording, r, node)).collect::<Vec<_>>();
-            // Of an even number of nodes the two in the middle stand for it.
-            let mean = |a: usize, b: usize| height(a).iter().zip(height(b)).map(|(a, b)| (a + b) / 2.0).collect::<Vec<_>>();
-            measures.mid_end_phase_deg = phase_between(recording, &mean((nodes - 1) / 2, nodes / 2), &mean(0, nodes - 1), period);
-        }
-        if ground {
-            let states = contact_states(recording);
-            let share = |state| states.iter().filter(|&&s| s == state).count() as f64 / records as f64;
-            measures.body_touching = Some(share(ContactState::BodyTouching));
-            measures.end_touching = Some(share(ContactState::EndTouching));
-            measures.aerial = Some(share(ContactState::Aerial));
+        let mut measures = follower.measures();
+        if measures.jump_height_mm.is_some() {
+            measures.recorded_jump_height_mm = Some(recorded_jump_height(recording));
         }
         measures
     }
@@ -196,6 +174,7 @@ impl Measures {
             damping_ratio: Some(0.0),
             half_power_bandwidth_hz: Some(0.0),
             jump_height_mm: Some(0.0),
+            recorded_jump_height_mm: Some(0.0),
             stride_mm: Some(0.0),
             speed_mm_s: Some(0.0),
             displacement_sum_mm: Some(0.0),
@@ -207,75 +186,6 @@ impl Measures {
             energy_error: Some(0.0),
         };
         full.named().into_iter().map(|(name, _)| name).collect()
-    }
-}
-
-/// The record from which on all voltages keep to their last value, but for creep and the like: what moves then rings, what moves before is driven.
-fn still_from(recording: &Recording) -> Option<usize> {
-    let joints = recording.joints();
-    let rows: Vec<&[f64]> = recording.motor_voltages.chunks_exact(joints.max(1)).collect();
-    let last = rows.last()?;
-    let away = |row: &[f64]| row.iter().zip(*last).fold(0.0_f64, |most, (v, end)| most.max((v - end).abs()));
-    let range = rows.iter().fold(0.0_f64, |most, row| most.max(away(row)));
-    let size = rows.iter().flat_map(|row| row.iter()).fold(0.0_f64, |most, v| most.max(v.abs()));
-    Some(if range <= STILL * size { 0 } else { rows.iter().rposition(|row| away(row) > STILL * range).map_or(0, |row| row + 1) })
-}
-
-fn z_mm(recording: &Recording, record: usize, node: usize) -> f64 {
-    mm_from_cm(recording.node(record, node)[2])
-}
-
-/// The record nearest to `count` periods before the end, if the run is that long.
-fn periods_before_end(recording: &Recording, period: f64, count: usize) -> Option<usize> {
-    let last = recording.len() - 1;
-    let start = recording.time[last] - period * count as f64;
-    if start < recording.time[0] - 1e-9 * period {
-        return None;
-    }
-    Some(nearest(&recording.time, start)).filter(|&from| from < last)
-}
-
-/// The record that begins the last half of the run in whole periods, at least one.
-fn half_run(recording: &Recording, period: f64) -> Option<usize> {
-    let duration = recording.time[recording.len() - 1] - recording.time[0];
-    periods_before_end(recording, period, ((duration / 2.0 / period).floor() as usize).max(1))
-}
-
-/// Phase (deg) of one signal against another at the drive's frequency; absent where either does not move at it.
-fn phase_between(recording: &Recording, signal: &[f64], against: &[f64], period: f64) -> Option<f64> {
-    let from = half_run(recording, period)?;
-    let fit = |values: &[f64]| {
-        let spread = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-        Harmonic::fit(&recording.time[from..], &values[from..], 1.0 / period).filter(|fit| fit.amplitude() > 1e-9 * spread)
-    };
-    Some(phase_difference_deg(fit(signal)?.phase_deg(), fit(against)?.phase_deg()))
-}
-
-fn period_ratio(recording: &Recording, period: f64) -> Option<f64> {
-    let duration = recording.time[recording.len() - 1] - recording.time[0];
-    let pairs = (duration / 4.0 / period).floor();
-    // At 12 periods the last six are compared with the six that began one or two periods before.
-    let window = 2.0 * period * pairs;
-    if pairs < 1.0 || window + 2.0 * period > duration * (1.0 + 1e-9) {
-        return None;
-    }
-    let heights: Vec<Vec<f64>> =
-        (0..recording.len()).map(|r| (0..recording.nodes()).map(|node| z_mm(recording, r, node)).collect()).collect();
-    let same = |shift: f64| repetition(&recording.time, &heights, shift, window).is_some_and(|r| r < SAME);
-    Some(if same(period) {
-        1.0
-    } else if same(2.0 * period) {
-        2.0
-    } else {
-        0.0
-    })
-}
-
-fn nearest(times: &[f64], t: f64) -> usize {
-    let after = times.partition_point(|&time| time < t);
-    match after.checked_sub(1) {
-        Some(before) if after == times.len() || t - times[before] <= times[after] - t => before,
-        _ => after,
     }
 }
 
@@ -405,7 +315,7 @@ mod tests {
     #[test]
     fn every_measure_can_be_asked_for_by_its_name() {
         let names = Measures::names();
-        assert_eq!(names.len(), 16);
+        assert_eq!(names.len(), 17);
         let measures = Measures { stride_mm: Some(2.5), ..Measures::default() };
         assert_eq!((measures.get("stride_mm"), measures.get("aerial")), (Some(2.5), None));
     }

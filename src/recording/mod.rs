@@ -2,6 +2,7 @@
 
 pub mod csv;
 pub mod definitions;
+pub(crate) mod follow;
 pub mod measures;
 mod npy;
 pub mod npz;

@@ -13,24 +13,76 @@ pub struct Harmonic {
     pub sin: f64,
 }
 
-impl Harmonic {
-    /// Fits one harmonic of `frequency` (Hz) by least squares; `None` if the samples cannot tell its three numbers apart.
-    pub fn fit(times: &[f64], values: &[f64], frequency: f64) -> Option<Self> {
-        if times.len() < 3 {
-            return None;
-        }
-        let mut normal = Matrix3::zeros();
-        let mut right = Vector3::zeros();
-        for (&t, &x) in times.iter().zip(values) {
-            let phase = 2.0 * std::f64::consts::PI * frequency * t;
-            let row = Vector3::new(1.0, phase.cos(), phase.sin());
-            normal += row * row.transpose();
-            right += row * x;
-        }
-        let p = normal.cholesky()?.solve(&right);
-        Some(Self { mean: p[0], cos: p[1], sin: p[2] })
+/// Least squares of one harmonic of `N` signals with common times, added up sample by sample. Each sample weighs as long as it stands for, half the
+/// time to its neighbours, so that it does not matter how many there are; where the stretch begins between two a straight line is laid.
+#[derive(Debug, Clone)]
+pub struct HarmonicSums<const N: usize> {
+    frequency: f64,
+    from: f64,
+    samples: usize,
+    /// Time and values of the last sample, and the time for which it stands so far.
+    last: Option<(f64, [f64; N], f64)>,
+    normal: Matrix3<f64>,
+    right: [Vector3<f64>; N],
+    /// Largest magnitude of each signal.
+    largest: [f64; N],
+}
+
+impl<const N: usize> HarmonicSums<N> {
+    /// Of `frequency` (Hz) from the time `from` (s) on, without samples.
+    pub fn new(frequency: f64, from: f64) -> Self {
+        let (normal, right, largest) = (Matrix3::zeros(), [Vector3::zeros(); N], [0.0; N]);
+        Self { frequency, from, samples: 0, last: None, normal, right, largest }
     }
 
+    /// Takes the values of the signals at `time` (s).
+    pub fn push(&mut self, time: f64, values: [f64; N]) {
+        let mut half = 0.0;
+        if let Some((before, old, stands)) = self.last.filter(|_| time > self.from) {
+            if before < self.from {
+                let share = (self.from - before) / (time - before);
+                half = 0.5 * (time - self.from);
+                self.add(self.from, std::array::from_fn(|k| old[k] + share * (values[k] - old[k])), half);
+            } else {
+                half = 0.5 * (time - before);
+                self.add(before, old, stands + half);
+            }
+        }
+        self.last = Some((time, values, half));
+    }
+
+    fn add(&mut self, time: f64, values: [f64; N], weight: f64) {
+        let (sin, cos) = (2.0 * std::f64::consts::PI * self.frequency * time).sin_cos();
+        let row = Vector3::new(1.0, cos, sin);
+        self.samples += 1;
+        self.normal += row * row.transpose() * weight;
+        for (k, value) in values.into_iter().enumerate() {
+            self.right[k] += row * (weight * value);
+            self.largest[k] = self.largest[k].max(value.abs());
+        }
+    }
+
+    /// The harmonic of each signal; `None` if the samples cannot tell its three numbers apart.
+    pub fn fit(&self) -> Option<[Harmonic; N]> {
+        let mut all = self.clone();
+        if let Some((time, values, stands)) = self.last {
+            all.add(time, values, stands);
+        }
+        let normal = all.normal.cholesky().filter(|_| all.samples >= 3)?;
+        Some(all.right.map(|right| {
+            let p = normal.solve(&right);
+            Harmonic { mean: p[0], cos: p[1], sin: p[2] }
+        }))
+    }
+
+    /// The phase (deg) of each signal that moves at the frequency, by more than rounding.
+    pub fn phases_deg(&self) -> [Option<f64>; N] {
+        let fit = self.fit();
+        std::array::from_fn(|k| fit.map(|fit| fit[k]).filter(|f| f.amplitude() > 1e-9 * self.largest[k]).map(|f| f.phase_deg()))
+    }
+}
+
+impl Harmonic {
     /// Amplitude, √(c² + s²).
     pub fn amplitude(&self) -> f64 {
         self.cos.hypot(self.sin)
@@ -148,7 +200,7 @@ fn turning_points(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// Where a parabola through three points has its top or bottom.
-fn parabola_top([x0, x1, x2]: [f64; 3], [y0, y1, y2]: [f64; 3]) -> Option<(f64, f64)> {
+pub(super) fn parabola_top([x0, x1, x2]: [f64; 3], [y0, y1, y2]: [f64; 3]) -> Option<(f64, f64)> {
     let (left, right) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
     let curvature = (right - left) / (x2 - x0);
     if curvature == 0.0 {
@@ -180,36 +232,79 @@ fn slope_error(values: &[f64], slope: f64) -> f64 {
     (off / (n - 2.0).max(1.0) / down).sqrt()
 }
 
-/// Root mean square of how far the signals of a system differ from what they were `period` (s) before, as a share of what unrelated
-/// motion would give, over the last `window` (s): 0 repeats, 1 does not. `signals` holds one row of values per time.
+/// Points of time in a period at which [`Repetition`] compares.
+const POINTS: usize = 200;
+
+/// How far the heights of a system's nodes differ from what they were one or two periods before, as a share of what unrelated motion would
+/// give: 0 repeats, 1 does not.
 ///
 /// ```text
-/// r = √(⟨|x(t) − x(t−T)|²⟩ / (2 ⟨|x − ⟨x⟩|²⟩))
+/// r = √(⟨|z(t) − z(t−T)|²⟩ / (2 ⟨|z − ⟨z⟩|²⟩))
 /// ```
 ///
-/// `None` if the record is shorter than window and period, or nothing moves.
-pub fn repetition(times: &[f64], signals: &[Vec<f64>], period: f64, window: f64) -> Option<f64> {
-    let (first, last) = (*times.first()?, *times.last()?);
-    let start = last - window;
-    if start - period < first - 1e-9 * period {
-        return None;
+/// at 200 points of time in a period, between samples by straight lines.
+#[derive(Debug, Clone)]
+pub struct Repetition {
+    period: f64,
+    /// When the motion begins and ends (s).
+    ends: [f64; 2],
+    /// Points in the window, and those taken so far with the two periods before it.
+    points: usize,
+    taken: usize,
+    nodes: usize,
+    /// Heights at the points of the last two periods, row after row.
+    rows: Vec<f64>,
+    /// Sums over the window of |z(t) − z(t−T)|² for T of one and of two periods.
+    changes: [f64; 2],
+    /// Sums over the window of z and z² of each node.
+    sums: Vec<[f64; 2]>,
+}
+
+impl Repetition {
+    /// Over the last `pairs` of pairs of periods (s) of a motion that begins and ends at `ends` (s), at least a pair earlier.
+    pub fn new(period: f64, pairs: usize, ends: [f64; 2], nodes: usize) -> Self {
+        let (rows, sums) = (vec![0.0; 2 * POINTS * nodes], vec![[0.0; 2]; nodes]);
+        Self { period, ends, points: 2 * pairs * POINTS, taken: 0, nodes, rows, changes: [0.0; 2], sums }
     }
-    let from = times.partition_point(|&t| t < start);
-    let rows = &signals[from..];
-    let width = rows.first()?.len();
-    let mean: Vec<f64> = (0..width).map(|k| rows.iter().map(|row| row[k]).sum::<f64>() / rows.len() as f64).collect();
-    let (mut change, mut spread) = (0.0, 0.0);
-    for (&t, row) in times[from..].iter().zip(rows) {
-        let before = (t - period).max(first);
-        let after = times.partition_point(|&time| time < before).clamp(1, times.len() - 1);
-        let share = (before - times[after - 1]) / (times[after] - times[after - 1]);
-        for k in 0..width {
-            let old = signals[after - 1][k] + share * (signals[after][k] - signals[after - 1][k]);
-            change += (row[k] - old).powi(2);
-            spread += (row[k] - mean[k]).powi(2);
+
+    /// The points of time up to the sample `now`, a time (s) and the nodes' x and z, from the sample before on.
+    pub fn take(&mut self, before: Option<(f64, &[[f64; 2]])>, now: (f64, &[[f64; 2]])) {
+        while self.taken <= self.points + 2 * POINTS {
+            let to_go = (self.points + 2 * POINTS - self.taken) as f64;
+            let due = (self.ends[1] - to_go / POINTS as f64 * self.period).max(self.ends[0]);
+            if due > now.0 {
+                return;
+            }
+            let (share, old) = before.map_or((1.0, now.1), |(time, nodes)| ((due - time) / (now.0 - time), nodes));
+            self.point(|node| old[node][1] + share * (now.1[node][1] - old[node][1]));
         }
     }
-    (spread > 0.0).then(|| (change / (2.0 * spread)).sqrt())
+
+    fn point(&mut self, height: impl Fn(usize) -> f64) {
+        let row = |taken: usize| taken % (2 * POINTS) * self.nodes;
+        let (two, one) = (row(self.taken), row(self.taken + POINTS));
+        let counts = self.taken > 2 * POINTS;
+        for node in 0..self.nodes {
+            let z = height(node);
+            if counts {
+                self.changes[0] += (z - self.rows[one + node]).powi(2);
+                self.changes[1] += (z - self.rows[two + node]).powi(2);
+                self.sums[node][0] += z;
+                self.sums[node][1] += z * z;
+            }
+            self.rows[two + node] = z;
+        }
+        self.taken += 1;
+    }
+
+    /// r for 1 or 2 `periods`; `None` if the motion has not come to its end, or nothing moves.
+    pub fn of(&self, periods: usize) -> Option<f64> {
+        let n = self.points as f64;
+        let spread: f64 = self.sums.iter().map(|[sum, squares]| squares - sum * sum / n).sum();
+        let rounding = 1e-12 * self.sums.iter().map(|[_, squares]| squares).sum::<f64>();
+        let complete = self.taken > self.points + 2 * POINTS;
+        (complete && spread > rounding).then(|| (self.changes[periods - 1] / (2.0 * spread)).sqrt())
+    }
 }
 
 #[cfg(test)]
@@ -226,10 +321,12 @@ mod tests {
     #[test]
     fn a_harmonic_is_found_beside_its_mean_and_its_lag_is_negative() {
         let (times, values) = sampled(0.5, 1e-3, |t| 3.0 + 2.0 * (2.0 * PI * 14.0 * t - 0.7).cos());
-        let fit = Harmonic::fit(&times, &values, 14.0).unwrap();
+        let mut sums = HarmonicSums::new(14.0, 0.0);
+        assert!(sums.fit().is_none());
+        times.iter().zip(&values).for_each(|(&t, &x)| sums.push(t, [x]));
+        let [fit] = sums.fit().unwrap();
         assert!((fit.mean - 3.0).abs() < 1e-12 && (fit.amplitude() - 2.0).abs() < 1e-12);
         assert!((fit.phase_deg() + 0.7f64.to_degrees()).abs() < 1e-10);
-        assert_eq!(Harmonic::fit(&times[..2], &values[..2], 14.0), None);
         assert_eq!(phase_difference_deg(-170.0, 170.0), 20.0);
         assert_eq!(phase_difference_deg(170.0, -170.0), -20.0);
     }
@@ -283,11 +380,15 @@ mod tests {
     #[test]
     fn a_subharmonic_repeats_after_two_periods_only() {
         let (times, values) = sampled(3.0, 1e-3, |t| (2.0 * PI * 5.0 * t).sin() + 0.7 * (2.0 * PI * 2.5 * t).cos());
-        let rows: Vec<Vec<f64>> = values.into_iter().map(|x| vec![x]).collect();
-        let r = |period: f64| repetition(&times, &rows, period, 0.8).unwrap();
-        // Only the subharmonic changes sign: r² = 4·0.7²/2/(2·(1 + 0.7²)/2).
-        assert!((r(0.2) - (2.0 * 0.49_f64 / 1.49).sqrt()).abs() < 1e-3);
-        assert!(r(0.4) < 1e-3);
-        assert_eq!(repetition(&times, &rows, 2.5, 0.8), None);
+        let rows: Vec<[[f64; 2]; 1]> = values.into_iter().map(|z| [[0.0, z]]).collect();
+        let mut repetition = Repetition::new(0.2, 2, [0.0, 3.0], 1);
+        for i in 0..times.len() {
+            assert_eq!(repetition.of(1), None);
+            let before = i.checked_sub(1).map(|before| (times[before], &rows[before][..]));
+            repetition.take(before, (times[i], &rows[i]));
+        }
+        // Only the subharmonic changes sign: r² = 4·0.7²/2/(2·(1 + 0.7²)/2). Straight lines between samples err by (ωΔt)²/8 = 1.2e-4.
+        assert!((repetition.of(1).unwrap() - (2.0 * 0.49_f64 / 1.49).sqrt()).abs() < 1e-3);
+        assert!(repetition.of(2).unwrap() < 1e-3);
     }
 }

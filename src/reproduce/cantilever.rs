@@ -2,9 +2,8 @@
 
 use super::{Bench, Findings, Origin, StudyError, curve};
 use crate::analytic;
+use crate::model::Material;
 use crate::model::units::mm_from_cm;
-use crate::model::{Material, Mount};
-use crate::recording::measures::Measures;
 use crate::recording::signal::Mode;
 use crate::sweep::Sweep;
 use crate::view::page::WHOLE;
@@ -35,7 +34,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
             shapes.extend(shape(r, r.len() - 1));
             left = shapes[0].0;
             shapes.push((f64::NAN, f64::NAN));
-            let tip = Measures::of(r, Mount::Clamped, None).tip_deflection_mm.unwrap_or(f64::NAN);
+            let tip = run.measures.tip_deflection_mm.unwrap_or(f64::NAN);
             if volts == -1000 {
                 findings.compare(
                     &format!("tip at −1000 V, m = 3, {name}"),
@@ -45,7 +44,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
                     "No published set of constants matches both this and the resonance: set 2 is nearer here, set 4 there.",
                 );
                 let (there, spot) = bench.run_on_bullet("cantilever-dc", &[set, "drive.voltages_v=[-1000]"])?;
-                let bullet = Measures::of(&spot.recording, Mount::Clamped, None).tip_deflection_mm.unwrap_or(f64::NAN);
+                let bullet = spot.measures.tip_deflection_mm.unwrap_or(f64::NAN);
                 findings.check_on_bullet("mm", tip, bullet);
                 findings.done_on(&experiment, Some(there.time_step));
             }
@@ -162,7 +161,7 @@ pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {
         let r = &run.recording;
         let tip = (0..r.len()).map(|i| (1e3 * r.time[i], 10.0 * r.node(i, r.nodes() - 1)[2]));
         figure.series(&format!("planar engine, dampingEta {eta}"), tip, Mark::Line);
-        let measures = Measures::of(r, Mount::Clamped, None);
+        let measures = run.measures;
         let beam = analytic::cantilever_frequency(&experiment.robot);
         // One mode under eq. 1: ζ = π η f with η = dampingEta/(2π).
         let expected = eta * beam / 2.0;
@@ -183,7 +182,7 @@ pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {
         );
         if eta == 0.008 {
             let (there, spot) = bench.run_on_bullet("cantilever-step", &[&format!("robot.damping_eta={eta}")])?;
-            let bullet = Measures::of(&spot.recording, Mount::Clamped, None).resonance_hz.unwrap_or(f64::NAN);
+            let bullet = spot.measures.resonance_hz.unwrap_or(f64::NAN);
             findings.check_on_bullet("Hz", measures.resonance_hz.unwrap_or(f64::NAN), bullet);
             findings.done_on(&experiment, Some(there.time_step));
         }

@@ -2,9 +2,9 @@
 
 use super::{Bench, Findings, Origin, StudyError, curve};
 use crate::experiment::Experiment;
-use crate::model::Mount;
 use crate::recording::Recording;
 use crate::recording::measures::{ContactState, Measures, contact_states};
+use crate::sweep::Sweep;
 use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, shape, signed};
 
@@ -33,8 +33,7 @@ fn jump(bench: &Bench, bullet: bool) -> Result<(Experiment, Recording, Measures)
     let settings = [REAL[0], REAL[1], "simulation.duration_s=1.2", RECORDS];
     let (experiment, run) =
         if bullet { bench.run_on_bullet("jump-14hz", &settings)? } else { bench.run("jump-14hz", &settings)? };
-    let measures = Measures::of(&run.recording, Mount::Ground, Some(PERIOD));
-    Ok((experiment, run.recording, measures))
+    Ok((experiment, run.recording, run.measures))
 }
 
 /// The states of contact over the last two periods, one after the other, with their lengths (s). Those shorter than 2 ms are rebounds
@@ -242,10 +241,10 @@ pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
 }
 
 pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
-    let (sweep, points) = bench.sweep("jump-on-time", "jump-on-time-scan", &[ON_TIME_RECORDS])?;
-    let ours = curve(&sweep, &points, sweep.axes.len() - 1, 0);
-    let (dense_sweep, dense) = bench.sweep("jump-on-time-dense", "jump-on-time-scan", &[])?;
-    let dense = curve(&dense_sweep, &dense, dense_sweep.axes.len() - 1, 0);
+    let mut sweep = Sweep::open("preset:jump-on-time-scan".as_ref(), &[ON_TIME_RECORDS.into()])?;
+    sweep.measures = vec!["recorded_jump_height_mm".into(), "jump_height_mm".into()];
+    let (sweep, points) = bench.points("jump-on-time", sweep)?;
+    let [ours, dense] = [0, 1].map(|measure| curve(&sweep, &points, sweep.axes.len() - 1, measure));
     let theirs: Vec<(f64, f64)> = ON_TIME
         .lines()
         .filter_map(|line| line.split_once(','))
@@ -280,7 +279,7 @@ pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
         last.bullet = format!("{} mm rms apart", fixed(rms(&bullet), 3));
     }
     findings.compare(
-        "the same with records without gaps",
+        "the same without gaps between records",
         "",
         format!("{} mm rms apart", fixed(rms(&dense), 3)),
         "",

@@ -1,8 +1,6 @@
 //! The five-actuator robot at rest and walking: sections III-B and IV.
 
 use super::{Bench, Findings, Origin, StudyError, curve};
-use crate::model::Mount;
-use crate::recording::measures::Measures;
 use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, minus, shape, signed};
 
@@ -63,7 +61,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
 pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     let (experiment, run) = bench.run("inchworm-1hz", &[])?;
     let r = &run.recording;
-    let stride = Measures::of(r, Mount::Ground, Some(1.0)).stride_mm.unwrap_or(f64::NAN);
+    let stride = run.measures.stride_mm.unwrap_or(f64::NAN);
     let mut findings = Findings::default();
     findings.compare(
         "travel per cycle at 1 Hz",
@@ -74,7 +72,7 @@ pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     );
     let (there, spot) = bench.run_on_bullet("inchworm-1hz", &[])?;
     findings.done_on(&experiment, Some(there.time_step));
-    let bullet = Measures::of(&spot.recording, Mount::Ground, Some(1.0)).stride_mm.unwrap_or(f64::NAN);
+    let bullet = spot.measures.stride_mm.unwrap_or(f64::NAN);
     findings.check_on_bullet("mm", stride, bullet);
     let mut figure = Figure::new("Inchworm motion", "time (s)", "travel along x (mm)");
     figure.setting("1 Hz, (300, 300, −1500, 300, 300) V, friction 0.2 and 4.0").size(WHOLE);

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::{Row, RowError, Rows, Sweep};
 use crate::experiment::{self, Control, Run};
-use crate::recording::measures::Measures;
 
 /// What a sweep has done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -102,10 +101,6 @@ fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Result<
     if let Some(reason) = trouble.first() {
         return Ok(Some(Row { index, measures: none, status: format!("failed: {reason}") }));
     }
-    let measures = Measures {
-        energy_error: run.audited.then(|| run.energy.error()),
-        ..Measures::of(&run.recording, experiment.robot.mount, experiment.drive.period())
-    };
-    let measures = sweep.measures.iter().map(|name| measures.get(name)).collect();
+    let measures = sweep.measures.iter().map(|name| run.measures.get(name)).collect();
     Ok(Some(Row { index, measures, status: "ok".into() }))
 }

@@ -22,7 +22,7 @@ pub use heatmap::{Categories, colour, heat_map};
 pub use image::{pdf, png};
 pub use number::{NONE, digits_for, fixed, minus, signed, significant};
 pub use player::player;
-pub use recordings::{Kind, amplitudes, shape, shapes, spectrum, traces};
+pub use recordings::{Kind, aliased, amplitudes, shape, shapes, spectrum, traces};
 pub use results::{ResultsError, View, figure_of_results, label_of, results};
 pub use series::Mark;
 pub(crate) use text::escape;

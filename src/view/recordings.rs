@@ -208,17 +208,117 @@ pub fn amplitudes(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let weighted: Vec<f64> =
         even.iter().enumerate().map(|(i, x)| window(i) * (x - mean - up / down * (i as f64 - middle))).collect();
     let weight = (n - 1) as f64 / 2.0;
-    // Up to half the sampling rate, and not more than a page can show.
-    (1..(2 * n).min(1200))
-        .map(|k| {
-            let turn = 0.5 * std::f64::consts::PI * k as f64 / (n - 1) as f64;
-            let (c, s) = weighted.iter().enumerate().fold((0.0, 0.0), |(c, s), (i, x)| {
-                let phase = turn * i as f64;
-                (c + x * phase.cos(), s + x * phase.sin())
-            });
-            (0.25 * k as f64 / duration, 2.0 / weight * f64::hypot(c, s))
-        })
+    // Up to half the sampling rate.
+    chirp_transform(&weighted, 4 * (n - 1), 2 * n - 1)
+        .into_iter()
+        .enumerate()
+        .skip(1)
+        .map(|(k, [c, s])| (0.25 * k as f64 / duration, 2.0 / weight * f64::hypot(c, s)))
         .collect()
+}
+
+/// Σ x_n e^(−2πi k n/size) for k below `count`, by Bluestein's algorithm.
+///
+/// # References
+/// L. I. Bluestein, IEEE Trans. Audio Electroacoust. 18 (1970).
+fn chirp_transform(x: &[f64], size: usize, count: usize) -> Vec<[f64; 2]> {
+    let length = (x.len() + count).next_power_of_two();
+    // e^(−πi n²/size), with n² reduced so that its sine stays exact.
+    let chirp = |n: usize| {
+        let turn = (n * n % (2 * size)) as f64 / size as f64;
+        let (sin, cos) = (std::f64::consts::PI * turn).sin_cos();
+        [cos, -sin]
+    };
+    let mut signal = vec![[0.0; 2]; length];
+    for (n, value) in x.iter().enumerate() {
+        signal[n] = chirp(n).map(|part| value * part);
+    }
+    let mut filter = vec![[0.0; 2]; length];
+    for n in 0..x.len().max(count) {
+        let [c, s] = chirp(n);
+        if n < count {
+            filter[n] = [c, -s];
+        }
+        if n > 0 && n < x.len() {
+            filter[length - n] = [c, -s];
+        }
+    }
+    fourier(&mut signal);
+    fourier(&mut filter);
+    // The inverse is the transform of the conjugate.
+    signal.iter_mut().zip(&filter).for_each(|(a, b)| {
+        let [re, im] = times(*a, *b);
+        *a = [re, -im];
+    });
+    fourier(&mut signal);
+    let scale = 1.0 / length as f64;
+    (0..count).map(|k| times(chirp(k), [scale * signal[k][0], -scale * signal[k][1]])).collect()
+}
+
+fn times([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a * c - b * d, a * d + b * c]
+}
+
+/// Fourier transform in place, of a power of two numbers.
+fn fourier(values: &mut [[f64; 2]]) {
+    let n = values.len();
+    let bits = n.trailing_zeros();
+    if bits == 0 {
+        return;
+    }
+    for i in 0..n {
+        let j = i.reverse_bits() >> (usize::BITS - bits);
+        if i < j {
+            values.swap(i, j);
+        }
+    }
+    let mut half = 1;
+    while half < n {
+        let turns: Vec<[f64; 2]> = (0..half)
+            .map(|k| {
+                let (sin, cos) = (-std::f64::consts::PI * k as f64 / half as f64).sin_cos();
+                [cos, sin]
+            })
+            .collect();
+        for block in values.chunks_mut(2 * half) {
+            let (low, high) = block.split_at_mut(half);
+            for ((a, b), turn) in low.iter_mut().zip(high).zip(&turns) {
+                let turned = times(*b, *turn);
+                *b = [a[0] - turned[0], a[1] - turned[1]];
+                *a = [a[0] + turned[0], a[1] + turned[1]];
+            }
+        }
+        half *= 2;
+    }
+}
+
+/// Harmonics of a drive that should be below half the record rate: those of a square wave fall with their number.
+const HARMONICS: f64 = 5.0;
+
+/// What a recording is too coarse for: its drive, or the first harmonics of it, above half the record rate, which a spectrum shows at wrong
+/// frequencies.
+pub fn aliased(recording: &Recording) -> Option<String> {
+    let (&first, &last) = (recording.time.first()?, recording.time.last()?);
+    let half = 0.5 * (recording.len() - 1) as f64 / (last - first);
+    let meta = &recording.meta;
+    let drive = match &meta.ground {
+        Some(ground) if ground.period > 0.0 => 1.0 / ground.period,
+        // Where the drive has no frequency it says 1 Hz.
+        _ if meta.driven_frequency == 1.0 && recording.motor_voltages.windows(2).all(|pair| pair[0] == pair[1]) => return None,
+        _ => meta.driven_frequency,
+    };
+    let what = if drive > half {
+        "the drive".to_owned()
+    } else if HARMONICS * drive > half {
+        format!("harmonics of the drive from number {:.0} on", (half / drive).floor() + 1.0)
+    } else {
+        return None;
+    };
+    Some(format!(
+        "{what} ({drive:.4} Hz) is above half the record rate, {half:.4} Hz, and shows at wrong frequencies; record more often than every \
+         {:.1e} s",
+        0.5 / (HARMONICS * drive)
+    ))
 }
 
 #[cfg(test)]
@@ -234,5 +334,29 @@ mod tests {
         // The straight line through a cosine of whole periods is level to 1/N.
         assert!((f - 14.0).abs() < 1e-9 && (a - 2.0).abs() < 0.01, "{f} {a}");
         assert!(amplitudes(&times[..3], &values[..3]).is_empty());
+    }
+
+    /// 400 Hz in one second of records every millisecond: beyond three hundred over the duration.
+    #[test]
+    fn a_spectrum_goes_up_to_half_the_record_rate() {
+        let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
+        let values: Vec<f64> = times.iter().map(|t| 0.3 * (2.0 * std::f64::consts::PI * 400.0 * t).cos()).collect();
+        let spectrum = amplitudes(&times, &values);
+        let (f, a) = spectrum.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert!((f - 400.0).abs() < 1e-9 && (a - 0.3).abs() < 0.002, "{f} {a}");
+        assert!((spectrum[spectrum.len() - 1].0 - 500.0).abs() < 0.3);
+    }
+
+    #[test]
+    fn a_drive_or_harmonics_above_half_the_record_rate_are_told() {
+        let recorded = |interval: f64| {
+            let ground =
+                crate::recording::GroundMeta { friction_low: 1.0, friction_high: 1.0, period: 0.1, date_time: String::new() };
+            let meta = crate::recording::Meta { ground: Some(ground), ..Default::default() };
+            aliased(&Recording { meta, time: (0..100).map(|i| interval * f64::from(i)).collect(), ..Default::default() })
+        };
+        assert_eq!(recorded(0.009), None);
+        assert!(recorded(0.02).unwrap().contains("harmonics of the drive from number 3 on"), "{:?}", recorded(0.02));
+        assert!(recorded(0.06).unwrap().starts_with("the drive (10 Hz) is above"), "{:?}", recorded(0.06));
     }
 }

@@ -106,6 +106,17 @@ impl Quad {
         self.lay(simd);
     }
 
+    /// Where the links point at their angles of now, with what `along` is known to be of; nothing is changed.
+    #[inline(always)]
+    pub(super) fn along_now<S: Simd>(&self, simd: S) -> [Four<S>; 2] {
+        let by = self.angle.on(simd) - self.posed.on(simd);
+        if by.abs().simd_gt(LARGEST_SERIES).any_true() {
+            on(simd, &direction(self.angle))
+        } else {
+            turned(on(simd, &self.along), by)
+        }
+    }
+
     /// Sets the joints' parts of the step's right side, −`share` (s) of their torques at the angles as they are, with the bodies towards the
     /// root at `inner` (rad). The implicit part adds what the mean rate makes.
     #[inline(always)]
