@@ -36,7 +36,7 @@ fn engine(experiment: &Experiment, time_step: f64) -> PlanarEngine {
 
 /// One step under 0 V.
 fn step(engine: &mut PlanarEngine) {
-    engine.prepare(&[0.0; 8]).unwrap();
+    engine.prepare(&vec![0.0; engine.actuators()]).unwrap();
     engine.advance().unwrap();
 }
 

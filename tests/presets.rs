@@ -21,7 +21,7 @@ fn sfers(arguments: &[&str]) -> Output {
 /// Runs the first 200 steps and takes its measures.
 fn begins(name: &str, mut experiment: Experiment) {
     experiment.steps = 200;
-    experiment.record_every = 20;
+    (experiment.record_every, experiment.record_from) = (20, 19);
     let run = experiment::run(&experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
     assert_eq!(run.recording.len(), 11, "{name}");
     assert!(run.trouble(&experiment).is_empty(), "{name}");

@@ -171,7 +171,8 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         });
         format!("{object}\n")
     } else {
-        let measures: String = measures.named().into_iter().map(|(name, value)| format!("{name} = {value:.6}\n")).collect();
+        let measures: String =
+            measures.named().into_iter().map(|(name, value)| format!("{name} = {}\n", six_digits(value))).collect();
         options.remark(&format!(
             "{steps} steps of {:e} s in {wall:.2} s ({steps_per_s:.0} steps/s), {} records",
             experiment.time_step,
@@ -261,6 +262,12 @@ fn spoken(seconds: f64) -> String {
         s => (s / 86400.0, "days"),
     };
     format!("{value:.0} {unit}")
+}
+
+/// A value with six digits behind the point, and no minus sign before zeros.
+fn six_digits(value: f64) -> String {
+    let text = format!("{value:.6}");
+    if text == "-0.000000" { "0.000000".into() } else { text }
 }
 
 /// A bar on stderr; indicatif hides it where stderr is no terminal.

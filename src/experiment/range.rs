@@ -76,6 +76,18 @@ pub(crate) fn step_too_long(time_step: f64, stable: f64) -> String {
     )
 }
 
+/// Steps that a period of the drive needs for its measures to be those of the drive, and not of what steps leave of it.
+const STEPS_OF_A_PERIOD: f64 = 4.0;
+
+/// What is wrong with a drive that repeats in fewer steps than [`STEPS_OF_A_PERIOD`].
+pub(super) fn aliased(experiment: &Experiment) -> Option<String> {
+    let period = experiment.drive.period().filter(|period| *period < STEPS_OF_A_PERIOD * experiment.time_step)?;
+    Some(format!(
+        "the drive's period of {period:e} s is shorter than {STEPS_OF_A_PERIOD} time steps of {:e} s, which cannot follow it; try a smaller time step",
+        experiment.time_step
+    ))
+}
+
 /// The largest stable step (s), if the experiment's is longer and its engine explicit, whose joints were bent by up to `curvature` (1/cm).
 pub(crate) fn unstable(experiment: &Experiment, curvature: f64) -> Option<f64> {
     let explicit = experiment.engine == EngineKind::Bullet;

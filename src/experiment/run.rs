@@ -57,6 +57,7 @@ pub struct Run {
 impl Run {
     /// What went wrong without stopping the run; measures of such a run would be those of another robot.
     pub fn trouble(&self, experiment: &Experiment) -> Vec<String> {
+        let aliased = range::aliased(experiment);
         let unstable = self.unstable.map(|stable| range::step_too_long(experiment.time_step, stable));
         let clamp = self.clamp_hits.map(|hits| {
             format!(
@@ -80,7 +81,7 @@ impl Run {
         let bending = self.bending.beyond(&experiment.robot, CLEARLY);
         let unsettled =
             self.unsettled.filter(|left| left.largest > UNSETTLED_TROUBLE).map(|left| range::unsettled(left, experiment));
-        unstable.into_iter().chain(clamp).chain(bending).chain(unsettled).chain(energy).collect()
+        aliased.into_iter().chain(unstable).chain(clamp).chain(bending).chain(unsettled).chain(energy).collect()
     }
 
     /// What is to be known of measures that are given: nothing that [`trouble`](Self::trouble) says.
@@ -187,7 +188,8 @@ pub fn run(
 /// steps from one regular sample to the next.
 fn follower(experiment: &Experiment, start: u64) -> (Follower, u64) {
     let (robot, h) = (&experiment.robot, experiment.time_step);
-    let period = experiment.drive.period();
+    // A drive that the steps do not follow has no periods to be measured by.
+    let period = experiment.drive.period().filter(|_| range::aliased(experiment).is_none());
     let first_mode = analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2);
     let spacing = period.unwrap_or(f64::INFINITY).min(1.0 / first_mode) / SAMPLES;
     let every = (spacing / h).max(1.0) as u64;

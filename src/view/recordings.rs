@@ -6,6 +6,7 @@ use super::series::Mark;
 use super::text::{number, significant};
 use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
+use crate::words;
 
 /// What is drawn of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -307,6 +308,7 @@ pub fn aliased(recording: &Recording) -> Option<String> {
         _ if meta.driven_frequency == 1.0 && recording.motor_voltages.windows(2).all(|pair| pair[0] == pair[1]) => return None,
         _ => meta.driven_frequency,
     };
+    let short = |frequency: f64| words::number((1e4 * frequency).round() / 1e4);
     let what = if drive > half {
         "the drive".to_owned()
     } else if HARMONICS * drive > half {
@@ -315,8 +317,9 @@ pub fn aliased(recording: &Recording) -> Option<String> {
         return None;
     };
     Some(format!(
-        "{what} ({drive:.4} Hz) is above half the record rate, {half:.4} Hz, and shows at wrong frequencies; record more often than every \
-         {:.1e} s",
+        "{what} ({} Hz) is above half the record rate, {} Hz, and shows at wrong frequencies; record more often than every {:.1e} s",
+        short(drive),
+        short(half),
         0.5 / (HARMONICS * drive)
     ))
 }
