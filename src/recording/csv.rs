@@ -41,7 +41,7 @@ pub fn is_recording(path: &Path) -> bool {
     read.is_ok() && start.starts_with(b"t_s,theta1_rad,")
 }
 
-/// Reads a recording that [`write`] wrote, also one of an older version without the nodes' velocities. y and the velocities as the
+/// Reads a recording that [`write()`] wrote, also one of an older version without the nodes' velocities. y and the velocities as the
 /// reference records them, which are not in it, are NaN. What only the manifest beside it
 /// knows (which joints share an actuator, whether there is a floor) is taken from there; without one, every joint counts as an
 /// actuator, and the words returned say so.

@@ -30,7 +30,7 @@ pub struct Measures {
     /// the run (deg): 0 for slow drives, negative for a lag. Clamped robots with a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_phase_deg: Option<f64>,
-    /// Frequency of the largest response (Hz), from how the right end rings after the last change of voltage: see [`Mode::of_ringing`]. Clamped
+    /// Frequency of the largest response (Hz), from how the right end rings after the last change of voltage: see [`Mode::of_ringing`](super::signal::Mode::of_ringing). Clamped
     /// robots whose voltage does not repeat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resonance_hz: Option<f64>,
