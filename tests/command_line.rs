@@ -481,3 +481,38 @@ fn a_spectrum_of_too_few_records_says_so() {
         assert!(drawn.status.success() && told.contains(words) && told.is_empty() == words.is_empty(), "{interval}: {told}");
     }
 }
+
+/// Bodies ten times as heavy sag ten times as far. Before, the step was chosen for the robot of the experiment file.
+#[test]
+fn an_automatic_step_is_chosen_for_the_robot_of_the_urdf() {
+    let text = |density: &str| {
+        format!(
+            "[material]\nsubstrate_density_g_cm3 = {density}\n[robot]\nactuators = 1\nmount = \"clamped\"\n[drive]\nwaveform = \"dc\"\n\
+             voltages_v = [0]\n[simulation]\nengine = \"planar\"\nstart = \"settled\"\ntime_step_s = \"auto\"\nduration_s = 0.01\n\
+             step_measure = \"tip_deflection_mm\"\n"
+        )
+    };
+    let bench = Bench::new(&text("8.1"));
+    fs::write(bench.path("heavy.toml"), text("81.0")).unwrap();
+    assert!(bench.sfers(&["urdf", "heavy.toml", "--out", "heavy.urdf"]).status.success());
+    let run = |robot: &[&str]| -> (f64, f64) {
+        let output = bench.sfers(&[&["run", "a.toml", "--json"], robot].concat());
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect(&String::from_utf8_lossy(&output.stderr));
+        let tried = json["step_choice"]["trials"][0]["value"].as_f64().unwrap();
+        (tried, json["measures"]["tip_deflection_mm"].as_f64().unwrap())
+    };
+    let (own, heavy) = (run(&[]), run(&["--robot", "heavy.urdf"]));
+    assert!((own.0 / own.1 - 1.0).abs() < 1e-3 && (heavy.0 / heavy.1 - 1.0).abs() < 1e-3, "{own:?} {heavy:?}");
+    assert!(heavy.0 / own.0 > 2.0, "{own:?} {heavy:?}");
+}
+
+/// At 1e-4 s the planar engine's strides on films of friction 4 are more than a tenth off, which 0.1 mm let pass before.
+#[test]
+fn strides_that_another_step_changes_get_no_verdict() {
+    let bench = Bench::new(CANTILEVER);
+    let settings = ["--set", "simulation.duration_s=0.4", "--set", "drive.frequency_hz=5"];
+    let judged =
+        bench.sfers(&[&["crosscheck", "--engines", "full-frictional-inchworm", "--planar-step", "1e-4"], &settings[..]].concat());
+    assert_eq!(judged.status.code(), Some(1), "{}", out(&judged));
+    assert!(out(&judged).contains("no verdict") && out(&judged).contains("with another step"), "{}", out(&judged));
+}
