@@ -30,13 +30,13 @@ impl Bending {
         }
     }
 
-    /// What is wrong with it, if the laminate was strained by more than `times` what it bears, or links that are no beam were turned by more than
-    /// a right angle.
+    /// What is wrong with it, if the laminate was strained by more than `times` what it bears, or neighbouring links were turned by more than
+    /// `times` a right angle: a coarse chain at resonance comes to one, and twice that folds a link onto its neighbour.
     pub(super) fn beyond(self, robot: &Robot, times: f64) -> Option<String> {
         let Self { angle, joint, time } = self;
         let strain = angle / robot.link_length() * robot.material.outer_fibre();
         let place = format!("joint {} is bent by {angle:.3} rad at t = {time:.6} s", joint + 1);
-        if angle > std::f64::consts::FRAC_PI_2 {
+        if angle > times * std::f64::consts::FRAC_PI_2 {
             return Some(format!(
                 "{place}, more than a right angle between neighbouring links, which are then no beam: the result is outside the model's \
                  range; try a weaker drive, a smaller time step, or more motors_per_actuator"
