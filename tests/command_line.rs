@@ -497,7 +497,8 @@ fn an_automatic_step_is_chosen_for_the_robot_of_the_urdf() {
     assert!(bench.sfers(&["urdf", "heavy.toml", "--out", "heavy.urdf"]).status.success());
     let run = |robot: &[&str]| -> (f64, f64) {
         let output = bench.sfers(&[&["run", "a.toml", "--json"], robot].concat());
-        let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect(&String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         let tried = json["step_choice"]["trials"][0]["value"].as_f64().unwrap();
         (tried, json["measures"]["tip_deflection_mm"].as_f64().unwrap())
     };
