@@ -188,8 +188,7 @@ pub fn run(
 /// steps from one regular sample to the next.
 fn follower(experiment: &Experiment, start: u64) -> (Follower, u64) {
     let (robot, h) = (&experiment.robot, experiment.time_step);
-    // A drive that the steps do not follow has no periods to be measured by.
-    let period = experiment.drive.period().filter(|_| range::aliased(experiment).is_none());
+    let period = experiment.drive.period();
     let first_mode = analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2);
     let spacing = period.unwrap_or(f64::INFINITY).min(1.0 / first_mode) / SAMPLES;
     let every = (spacing / h).max(1.0) as u64;

@@ -21,6 +21,9 @@ const RINGING: usize = 1 << 20;
 /// Voltages within this share of their travel from the last one stand still: a jump with 5 % of creep does.
 const STILL: f64 = 0.1;
 
+/// Samples that a period needs for phases and repetition: with fewer the drive is aliased.
+const SAMPLES_OF_A_PERIOD: f64 = 4.0;
+
 /// Part of an extreme that need not be followed (cm).
 const NEGLIGIBLE: f64 = 1e-4;
 
@@ -112,12 +115,22 @@ impl Course {
         self.periods_before_end(period, ((self.last - self.first) / 2.0 / period).floor().max(1.0))
     }
 
+    /// Whether the samples follow what happens within a period.
+    fn resolves(&self, period: f64) -> bool {
+        period * self.samples.saturating_sub(1) as f64 >= SAMPLES_OF_A_PERIOD * (self.last - self.first)
+    }
+
+    /// When the last half begins in whole periods, if the samples follow what happens in them.
+    fn resolved_half(&self, period: f64) -> Option<f64> {
+        self.half(period).filter(|_| self.resolves(period))
+    }
+
     /// Pairs of periods in the last half, and how the heights repeat in them. At 12 periods the last six are compared with the six that
     /// began one or two periods before.
     fn repetition(&self, period: f64) -> Option<Repetition> {
         let duration = self.last - self.first;
         let pairs = (duration / 4.0 / period).floor();
-        let enough = pairs >= 1.0 && 2.0 * period * (pairs + 1.0) <= duration * (1.0 + 1e-9);
+        let enough = self.resolves(period) && pairs >= 1.0 && 2.0 * period * (pairs + 1.0) <= duration * (1.0 + 1e-9);
         enough.then(|| Repetition::new(period, pairs as usize, [self.first, self.last], self.nodes))
     }
 }
@@ -127,7 +140,7 @@ impl Follower {
         let course = Course { period: course.period.filter(|&period| period > 0.0), ..course };
         let period = course.period;
         let kind = if course.mount == Mount::Clamped {
-            let half = period.and_then(|period| Some((course.half(period)?, period)));
+            let half = period.and_then(|period| Some((course.resolved_half(period)?, period)));
             let rings = if period.is_none() { course.samples.min(RINGING) } else { 0 };
             Kind::Clamped(Box::new(Clamped {
                 tip: 0.0,
@@ -140,7 +153,7 @@ impl Follower {
                 last: [(f64::NAN, f64::NAN); 2],
             }))
         } else {
-            let half = period.and_then(|period| Some((course.half(period)?, period)));
+            let half = period.and_then(|period| Some((course.resolved_half(period)?, period)));
             let begin = |time: f64| Start { time, mean_x: None };
             Kind::Mobile(Box::new(Mobile {
                 jump_height: f64::NEG_INFINITY,
@@ -149,7 +162,7 @@ impl Follower {
                 state: ContactState::Aerial,
                 close: false,
                 stride: period.and_then(|period| course.periods_before_end(period, 1.0)).map(begin),
-                speed: if period.is_some() { half.map(|half| begin(half.0)) } else { Some(begin(course.first)) },
+                speed: if let Some(period) = period { course.half(period).map(begin) } else { Some(begin(course.first)) },
                 harmonics: half.map(|(from, period)| HarmonicSums::new(1.0 / period, from)),
                 repetition: period.and_then(|period| course.repetition(period)),
             }))
