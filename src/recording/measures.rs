@@ -304,6 +304,18 @@ mod tests {
         assert_eq!(state(high), ContactState::Aerial);
     }
 
+    /// 500 Hz seen a thousand times a second is aliased; 10¹² Hz kept the comparison of periods busy for ever.
+    #[test]
+    fn a_period_that_the_records_do_not_follow_has_no_phases_and_no_ratio() {
+        let node = |i: usize, t: f64| (i as f64, 1.0 + 0.1 * (2.0 * PI * 10.0 * t).cos());
+        for period in [2e-3, 1e-12] {
+            let ground = Measures::of(&recording(&times(), 4, 10.0, node), Mount::Ground, Some(period));
+            assert_eq!((ground.period_ratio, ground.mid_end_phase_deg), (None, None), "{period}");
+            let clamped = Measures::of(&recording(&times(), 4, 10.0, node), Mount::Clamped, Some(period));
+            assert_eq!(clamped.tip_phase_deg, None, "{period}");
+        }
+    }
+
     #[test]
     fn a_run_shorter_than_a_period_has_no_stride_and_an_empty_one_no_measures() {
         let robot = recording(&times(), 1, 1.0, |i, _| (i as f64, 0.0));
