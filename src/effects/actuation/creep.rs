@@ -4,11 +4,11 @@
 //! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r) up to T_max,  w_j = c/r·(T_j/1 s)^p
 //! ```
 //!
-//! T_max is three times the run's length unless it is given. A run that goes on from a saved state keeps the levels that it began with, whatever its
+//! The elements are a Kelvin-Voigt chain. T_max is three times the run's length unless it is given. A run that goes on from a saved state keeps the elements that it began with, whatever its
 //! length; runs of different lengths are of the same robot only where T_max is given.
 //!
-//! With p = 0 a step grows by c of itself in every decade of time, with another p by a power law of time. r is the number of rungs in a decade; the
-//! usual ladder has one, the first at 0.1 s. With r = 0 there is one rung of the weight c: a Kelvin-Voigt element.
+//! With p = 0 a step grows by c of itself in every decade of time, with another p by a power law of time. r is the number of elements in a decade; the
+//! usual chain has one, the first at 0.1 s. With r = 0 there is one element of the weight c.
 
 use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
 
@@ -35,7 +35,7 @@ pub const CREEP: Effect = Effect {
             bounds: [0.0, 4.0],
             off: None,
             default: Some(1.0),
-            about: "r; 0 is a single rung of the weight c",
+            about: "r; 0 is a single element of the weight c",
         },
         Parameter {
             name: "fastest_s",
@@ -43,7 +43,7 @@ pub const CREEP: Effect = Effect {
             bounds: [0.01, 100.0],
             off: None,
             default: Some(0.1),
-            about: "time constant T_0 of the first rung",
+            about: "time constant T_0 of the first element",
         },
         Parameter {
             name: "slowest_s",
@@ -55,66 +55,66 @@ pub const CREEP: Effect = Effect {
         },
     ],
     action: Action::Voltages(|p, n, duration| {
-        let ladder = Ladder { growth: p[0], power: p[1], per_decade: p[2], fastest: p[3] };
-        let rungs = ladder.up_to(if p[4] > 0.0 { p[4] } else { 3.0 * duration });
-        Box::new(Creep { behind: vec![vec![0.0; n]; rungs.len()], rungs, ladder, actuators: n })
+        let chain = Chain { growth: p[0], power: p[1], per_decade: p[2], fastest: p[3] };
+        let elements = chain.up_to(if p[4] > 0.0 { p[4] } else { 3.0 * duration });
+        Box::new(Creep { behind: vec![vec![0.0; n]; elements.len()], elements, chain, actuators: n })
     }),
 };
 
-/// What decides the time constant (s) and weight of every rung.
+/// What decides the time constant (s) and weight of every element.
 #[derive(Debug, Clone, Copy)]
-struct Ladder {
+struct Chain {
     growth: f64,
     power: f64,
     per_decade: f64,
     fastest: f64,
 }
 
-impl Ladder {
-    fn time(&self, rung: usize) -> f64 {
-        self.fastest * 10_f64.powf(rung as f64 / self.per_decade)
+impl Chain {
+    fn time(&self, element: usize) -> f64 {
+        self.fastest * 10_f64.powf(element as f64 / self.per_decade)
     }
 
     /// The first `count` of them.
-    fn rungs(&self, count: usize) -> Vec<[f64; 2]> {
+    fn elements(&self, count: usize) -> Vec<[f64; 2]> {
         if self.per_decade == 0.0 {
             return vec![[self.fastest, self.growth]];
         }
-        let rung = |rung| [self.time(rung), self.growth / self.per_decade * self.time(rung).powf(self.power)];
-        (0..count).map(rung).collect()
+        let element = |element| [self.time(element), self.growth / self.per_decade * self.time(element).powf(self.power)];
+        (0..count).map(element).collect()
     }
 
     /// Those of time constants up to `slowest` (s), at least the first.
     fn up_to(&self, slowest: f64) -> Vec<[f64; 2]> {
-        let more = if self.per_decade == 0.0 { 0 } else { (1..).take_while(|rung| self.time(*rung) <= slowest).count() };
-        self.rungs(1 + more)
+        let more = if self.per_decade == 0.0 { 0 } else { (1..).take_while(|element| self.time(*element) <= slowest).count() };
+        self.elements(1 + more)
     }
 }
 
 struct Creep {
     /// T_j (s) and w_j.
-    rungs: Vec<[f64; 2]>,
+    elements: Vec<[f64; 2]>,
     /// q_j of every actuator.
     behind: Vec<Vec<f64>>,
-    ladder: Ladder,
+    chain: Chain,
     actuators: usize,
 }
 
-/// Most rungs that a memory may hold: four in each of 50 decades.
-const MOST_RUNGS: f64 = 200.0;
+/// Most elements that a memory may hold: four in each of 50 decades.
+const MOST_ELEMENTS: f64 = 200.0;
 
 impl Voltages for Creep {
     /// What has crept before is part of the settled shape: q_j = V.
     fn settle(&mut self, volts: &mut [f64]) {
         self.behind.iter_mut().for_each(|q| q.copy_from_slice(volts));
-        let whole: f64 = self.rungs.iter().map(|[_, weight]| weight).sum();
+        let whole: f64 = self.elements.iter().map(|[_, weight]| weight).sum();
         volts.iter_mut().for_each(|v| *v *= 1.0 + whole);
     }
 
     fn pass(&mut self, dt: f64, volts: &mut [f64]) {
         for (i, volts) in volts.iter_mut().enumerate() {
             let mut crept = 0.0;
-            for ([time, weight], q) in self.rungs.iter().zip(&mut self.behind) {
+            for ([time, weight], q) in self.elements.iter().zip(&mut self.behind) {
                 let steps = dt / time;
                 let gone = -(-steps).exp_m1();
                 let away = q[i] - *volts;
@@ -125,21 +125,22 @@ impl Voltages for Creep {
         }
     }
 
-    /// The number of rungs, then q_j.
+    /// The number of elements, then q_j.
     fn memory(&self) -> Vec<f64> {
-        std::iter::once(self.rungs.len() as f64).chain(self.behind.iter().flatten().copied()).collect()
+        std::iter::once(self.elements.len() as f64).chain(self.behind.iter().flatten().copied()).collect()
     }
 
     fn held(&self, saved: &[f64]) -> Option<usize> {
         let count = *saved.first()?;
-        let fits = count.fract() == 0.0 && (1.0..=MOST_RUNGS).contains(&count) && (count == 1.0 || self.ladder.per_decade > 0.0);
+        let fits =
+            count.fract() == 0.0 && (1.0..=MOST_ELEMENTS).contains(&count) && (count == 1.0 || self.chain.per_decade > 0.0);
         let held = 1 + count as usize * self.actuators;
         (fits && held <= saved.len()).then_some(held)
     }
 
     fn remember(&mut self, memory: &[f64]) {
         let [count, behind @ ..] = memory else { return };
-        self.rungs = self.ladder.rungs(*count as usize);
+        self.elements = self.chain.elements(*count as usize);
         self.behind = behind.chunks_exact(self.actuators).map(<[f64]>::to_vec).collect();
     }
 }
@@ -161,16 +162,16 @@ mod tests {
                 at.push(volts[0]);
             }
         }
-        // 0.02 of 1000 V per decade; a ladder of one rung per decade ripples by a few per cent.
+        // 0.02 of 1000 V per decade; a chain of one element per decade ripples by a few per cent.
         for pair in at.windows(2) {
             assert!((pair[1] - pair[0] - 20.0).abs() < 1.0, "{at:?}");
         }
     }
     #[test]
-    fn finer_rungs_grow_alike_and_a_power_of_time_grows_as_such() {
+    fn finer_elements_grow_alike_and_a_power_of_time_grows_as_such() {
         let Action::Voltages(make) = CREEP.action else { unreachable!() };
         let at = |values: &[f64], times: &[usize]| {
-            // Rungs up to 3·10⁵ s: what lies beyond takes 20·log₁₀e·t/3·10⁵ s, 10⁻³ of the growth at 30 s.
+            // Elements up to 3·10⁵ s: what lies beyond takes 20·log₁₀e·t/3·10⁵ s, 10⁻³ of the growth at 30 s.
             let mut creep = make(values, 1, 1e5);
             creep.settle(&mut [0.0]);
             let mut found = Vec::new();
@@ -184,13 +185,13 @@ mod tests {
             found
         };
         let fine = at(&[0.02, 0.0, 4.0, 0.01, 0.0], &[300, 3_000, 30_000]);
-        // Four rungs a decade: no ripple to speak of.
+        // Four elements a decade: no ripple to speak of.
         assert!(fine.windows(2).all(|pair| (pair[1] - pair[0] - 20.0).abs() < 0.02), "{fine:?}");
-        // w = c/r·T^p over rungs that are dense in log T: c·Γ(1 − p)/(p ln 10)·t^p but for a constant.
+        // w = c/r·T^p over elements that are dense in log T: c·Γ(1 − p)/(p ln 10)·t^p but for a constant.
         let power = at(&[0.02, 0.3, 4.0, 0.01, 0.0], &[300, 3_000, 30_000]);
         let ratio = (power[2] - power[1]) / (power[1] - power[0]);
         assert!((ratio / 10_f64.powf(0.3) - 1.0).abs() < 0.01, "{power:?}");
-        // One rung: 1 − exp(−t/T).
+        // One element: 1 − exp(−t/T).
         let single = at(&[0.02, 0.0, 0.0, 2.0, 0.0], &[2_000]);
         assert!((single[0] - 20.0 * -(-1.0_f64).exp_m1()).abs() < 0.01, "{single:?}");
     }
