@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::{Failure, Options, print};
+use super::{Failure, Options, print, say};
 use crate::crosscheck::{self, BUILTIN, EngineReport, EngineVerdict, PARTED, Quantity, Report, compare};
 use crate::experiment::{self, Control, Experiment, Source};
 use crate::recording::{Recording, npz};
@@ -210,7 +210,7 @@ fn check(item: Item, args: &Args) -> Result<Outcome, Failure> {
     };
     let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
     // Equal bits of a run that went wrong are equal bits.
-    run.trouble(&experiment).iter().for_each(|trouble| eprintln!("warning: {name}: {trouble}"));
+    run.trouble(&experiment).iter().for_each(|trouble| say(&format!("warning: {name}: {trouble}")));
     Ok(Outcome { name, against, report: compare(&run.recording, &theirs) })
 }
 

@@ -4,6 +4,7 @@ use super::{EngineKind, Experiment};
 use crate::analytic;
 use crate::engine::Unsettled;
 use crate::model::Robot;
+use crate::recording::follow::SAMPLES_OF_A_PERIOD;
 
 /// Times the strain that the material bears at which a result is clearly outside the model's range.
 pub(super) const CLEARLY: f64 = 2.0;
@@ -76,14 +77,11 @@ pub(crate) fn step_too_long(time_step: f64, stable: f64) -> String {
     )
 }
 
-/// Steps that a period of the drive needs for its measures to be those of the drive, and not of what steps leave of it.
-const STEPS_OF_A_PERIOD: f64 = 4.0;
-
-/// What is wrong with a drive that repeats in fewer steps than [`STEPS_OF_A_PERIOD`].
+/// What is wrong with a drive that repeats in fewer steps than [`SAMPLES_OF_A_PERIOD`].
 pub(super) fn aliased(experiment: &Experiment) -> Option<String> {
-    let period = experiment.drive.period().filter(|period| *period < STEPS_OF_A_PERIOD * experiment.time_step)?;
+    let period = experiment.drive.period().filter(|period| *period < SAMPLES_OF_A_PERIOD * experiment.time_step)?;
     Some(format!(
-        "the drive's period of {period:e} s is shorter than {STEPS_OF_A_PERIOD} time steps of {:e} s, which cannot follow it; try a smaller time step",
+        "the drive's period of {period:e} s is shorter than {SAMPLES_OF_A_PERIOD} time steps of {:e} s, which cannot follow it; try a smaller time step",
         experiment.time_step
     ))
 }

@@ -14,9 +14,9 @@ use crate::recording::measures::{Measures, recorded_jump_height};
 const OBSERVE_EVERY: u64 = 256;
 /// The same in steps times joints, so that a step of a long chain is not waited for too often.
 const OBSERVE_EVERY_JOINTS: u64 = 1 << 14;
-/// Steps between two readings of the joint angles for [`Bending`], of an engine that computes them on demand: 6 ms of steps of 0.1 ms. On Bullet,
-/// which reads them anyway, every step counts, and on both every record.
-const BEND_EVERY_MIDPOINT: u64 = 64;
+/// Samples of measures between two readings of the joint angles for [`Bending`], of an engine that computes them on demand: ten readings in a
+/// period miss at most 5 % of an amplitude. On Bullet, which reads them anyway, every step counts.
+const BEND_EVERY_SAMPLES: u64 = 10;
 
 /// Samples that measures are taken of in a period of the drive, and in one of an actuator's first mode.
 const SAMPLES: f64 = 100.0;
@@ -116,7 +116,6 @@ pub fn run(
     let parts = if matches!(experiment.drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
     let mut pieces = vec![0.0; parts * experiment.robot.actuators];
     let observe_every = (OBSERVE_EVERY_JOINTS / experiment.robot.joints().max(1) as u64).clamp(1, OBSERVE_EVERY);
-    let bend_every = if midpoint { BEND_EVERY_MIDPOINT } else { 1 };
     let mut bending = Bending::default();
     let view = View::new(&experiment.effects);
     let origin = -0.5 * experiment.robot.segments()[0].length;
@@ -124,10 +123,13 @@ pub fn run(
     let mut done = engine.step();
     let start = done;
     let (mut follower, every) = follower(experiment, start);
+    let mut sampled = Every::new(start, every);
+    let mut bent = Every::new(start, if midpoint { BEND_EVERY_SAMPLES * every } else { 1 });
+    let mut observed = Every::new(start, observe_every);
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
     let mut means = Means::new(&experiment.drive, experiment.robot.actuators, done as f64 * experiment.time_step);
     while done < experiment.steps {
-        if done.is_multiple_of(observe_every) && observe(done) == Control::Stop {
+        if observed.comes(done) && observe(done) == Control::Stop {
             interrupted = true;
             break;
         }
@@ -150,14 +152,15 @@ pub fn run(
         if let Some(books) = &mut books {
             books.take(engine)?;
         }
-        let regular = (done - start).is_multiple_of(every) || done + 1 == experiment.steps;
+        let last = done + 1 == experiment.steps;
+        let regular = sampled.comes(done) || last;
         if regular || follower.is_close() {
             follow(&mut follower, time, regular, engine, (&view, origin))?;
         }
         if experiment.records(done) {
             recorder.record(time, engine)?;
-            bending.take(recorder.last_angles(), time);
-        } else if done.is_multiple_of(bend_every) {
+        }
+        if bent.comes(done) || last {
             bending.take(&engine.joints().angles, time);
         }
         engine.advance()?;
@@ -182,6 +185,27 @@ pub fn run(
         bending,
         energy: energy.unwrap_or_default(),
     })
+}
+
+/// Steps at equal distances, told without a division in each step.
+struct Every {
+    next: u64,
+    by: u64,
+}
+
+impl Every {
+    fn new(first: u64, by: u64) -> Self {
+        Self { next: first, by }
+    }
+
+    /// Whether `step` is one of them; asked in every step.
+    fn comes(&mut self, step: u64) -> bool {
+        let comes = step == self.next;
+        if comes {
+            self.next += self.by;
+        }
+        comes
+    }
 }
 
 /// What follows a run from step `start` on: the states before its steps, as a recording of all of them would hold them. And the number of
@@ -292,12 +316,6 @@ impl Recorder {
             node_velocities: of(3 * nodes),
         };
         Self { recording, nodes }
-    }
-
-    /// Joint angles of the last record (rad).
-    fn last_angles(&self) -> &[f64] {
-        let angles = &self.recording.angles;
-        &angles[angles.len() - (self.nodes - 2)..]
     }
 
     fn record(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {

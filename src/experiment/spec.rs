@@ -27,7 +27,7 @@ impl Experiment {
                 "substrate_thickness": m.substrate_thickness, "substrate_density": m.substrate_density,
                 "adhesive_modulus": m.adhesive_modulus, "adhesive_thickness": m.adhesive_thickness,
                 "adhesive_density": m.adhesive_density,
-                "max_field": m.max_field, "max_strain": m.max_strain,
+                "max_field": m.max_field.min(f64::MAX), "max_strain": m.max_strain.min(f64::MAX),
             },
             "actuators": self.robot.actuators,
             "motors_per_actuator": self.robot.motors_per_actuator,

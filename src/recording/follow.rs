@@ -22,7 +22,7 @@ const RINGING: usize = 1 << 20;
 const STILL: f64 = 0.1;
 
 /// Samples that a period needs for phases and repetition: with fewer the drive is aliased.
-const SAMPLES_OF_A_PERIOD: f64 = 4.0;
+pub(crate) const SAMPLES_OF_A_PERIOD: f64 = 4.0;
 
 /// Part of an extreme that need not be followed (cm).
 const NEGLIGIBLE: f64 = 1e-4;

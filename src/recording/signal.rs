@@ -233,7 +233,7 @@ fn slope_error(values: &[f64], slope: f64) -> f64 {
 }
 
 /// Points of time in a period at which [`Repetition`] compares.
-const POINTS: usize = 200;
+const POINTS: usize = 100;
 
 /// How far the heights of a system's nodes differ from what they were one or two periods before, as a share of what unrelated motion would
 /// give: 0 repeats, 1 does not.
@@ -242,7 +242,7 @@ const POINTS: usize = 200;
 /// r = √(⟨|z(t) − z(t−T)|²⟩ / (2 ⟨|z − ⟨z⟩|²⟩))
 /// ```
 ///
-/// at 200 points of time in a period, between samples by straight lines.
+/// at 100 points of time in a period, between samples by straight lines.
 #[derive(Debug, Clone)]
 pub struct Repetition {
     period: f64,

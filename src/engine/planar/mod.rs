@@ -567,7 +567,10 @@ fn joints_of(k: usize, root: usize) -> (Option<usize>, usize) {
 
 impl Engine for PlanarEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
-        EngineError::unless_voltages(voltages.len(), self.actuators())?;
+        // Without the division by the motors of an actuator, in every step.
+        if voltages.len() * self.motors_per_actuator + 1 != self.count {
+            return Err(EngineError::Voltages { given: voltages.len(), needed: self.actuators() });
+        }
         self.apply(voltages);
         if self.finite { Ok(()) } else { self.check_finite() }
     }
