@@ -6,7 +6,7 @@ use crate::model::{DRY_FRICTION_RATE, LOSS_TIMES, Mount, Robot};
 
 /// Share of the result that bisections end at.
 const PRECISION: f64 = 1e-15;
-/// Frequencies that a robot with a loss ladder is tested at, and the lowest as a share of the highest.
+/// Frequencies that a robot with material loss (a generalised Maxwell chain) is tested at, and the lowest as a share of the highest.
 const FREQUENCIES: u32 = 24;
 const LOWEST_SHARE: f64 = 1e-4;
 /// Growth per step that counts as rounding.
@@ -51,27 +51,30 @@ impl Chain {
     fn is_positive(&self, scale: f64, drag: f64, joint: f64, clamp: f64) -> bool {
         let mut outboard = Inertia::default();
         for (i, (body, length)) in self.bodies.iter().zip(&self.lengths).enumerate().rev() {
-            // What hangs on the right end, felt at the left one.
+            // Articulated inertia of the bodies from here to the right end, about the left end of this one.
             let Inertia { mass, moment, about_end } = outboard;
-            let felt = Inertia {
+            let articulated = Inertia {
                 mass: scale * body.mass + mass,
                 moment: scale * body.moment + moment + mass * length,
                 about_end: scale * body.about_end - drag + about_end + length * (2.0 * moment + mass * length),
             };
             if i == 0 {
                 return match self.mount {
-                    Mount::Clamped => self.clamp.is_none() || felt.about_end + clamp > 0.0,
-                    _ => felt.mass > 0.0 && felt.mass * felt.about_end - felt.moment * felt.moment > 0.0,
+                    Mount::Clamped => self.clamp.is_none() || articulated.about_end + clamp > 0.0,
+                    _ => {
+                        articulated.mass > 0.0
+                            && articulated.mass * articulated.about_end - articulated.moment * articulated.moment > 0.0
+                    }
                 };
             }
-            let pivot = felt.about_end + joint;
+            let pivot = articulated.about_end + joint;
             if pivot.is_nan() || pivot <= 0.0 {
                 return false;
             }
             outboard = Inertia {
-                mass: felt.mass - felt.moment * felt.moment / pivot,
-                moment: felt.moment * joint / pivot,
-                about_end: felt.about_end * joint / pivot,
+                mass: articulated.mass - articulated.moment * articulated.moment / pivot,
+                moment: articulated.moment * joint / pivot,
+                about_end: articulated.about_end * joint / pivot,
             };
         }
         true
@@ -125,7 +128,7 @@ pub fn highest_joint_frequency(robot: &Robot) -> f64 {
 /// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require less.
 ///
 /// The robot's extensions count: factors on stiffness, damping and mass, point masses, a clamp that gives (implicit, so that it adds `h²/c` at
-/// the root), dry friction in the joints with its slope at rest, viscous friction on the floor (bounded from above), the loss ladder (by the
+/// the root), dry friction in the joints with its slope at rest, viscous friction on the floor (bounded from above), the generalised Maxwell chain of material loss (by the
 /// spectral radius of a step at frequencies up to the highest). Hardening is left to [`stable_step_at`]; drag in air, whose rate
 /// stays below 1 % of 1/h at any speed that Bullet allows, is left out.
 pub fn stable_step(robot: &Robot) -> f64 {
@@ -161,13 +164,13 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     let highest = highest_joint_frequency(robot).powi(2) * hardening;
     let share = |n: u32| LOWEST_SHARE.powf(2.0 * f64::from(n) / f64::from(FREQUENCIES));
     largest(step.min(2.0 * LOSS_TIMES[0]), |h| {
-        (0..=FREQUENCIES).all(|n| ladder_is_stable(highest * share(n), damping / stiffness, extensions.loss, h))
+        (0..=FREQUENCIES).all(|n| maxwell_chain_is_stable(highest * share(n), damping / stiffness, extensions.loss, h))
     })
 }
 
 /// Whether a step of length `h` (s) lets no mode of the square `omega2` of its frequency (1/s²), with damping time `damping` (s), grow by the
-/// loss ladder, which Bullet's engine turns on with the rates of the step's beginning.
-fn ladder_is_stable(omega2: f64, damping: f64, loss: f64, h: f64) -> bool {
+/// generalised Maxwell chain, which Bullet's engine turns on with the rates of the step's beginning.
+fn maxwell_chain_is_stable(omega2: f64, damping: f64, loss: f64, h: f64) -> bool {
     // Rate times h, angle, q of each level.
     let mut step = SMatrix::<f64, 7, 7>::identity();
     let kick = h * h * omega2;

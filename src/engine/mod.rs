@@ -153,12 +153,12 @@ pub struct Unsettled {
     pub first_step: u64,
     /// The last.
     pub last_step: u64,
-    /// Largest change of a lift that was left (cm/s), the tolerance being [`Unsettled::TOLERANCE`].
+    /// Largest change of the de Saxcé correction that was left (cm/s), the tolerance being [`Unsettled::TOLERANCE`].
     pub largest: f64,
 }
 
 impl Unsettled {
-    /// Change of a lift at which the iteration is done (cm/s).
+    /// Change of the de Saxcé correction at which the iteration is done (cm/s).
     pub const TOLERANCE: f64 = planar::LIFT_ENOUGH;
 }
 

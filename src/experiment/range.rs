@@ -4,7 +4,7 @@ use super::{EngineKind, Experiment};
 use crate::analytic;
 use crate::engine::Unsettled;
 use crate::model::Robot;
-use crate::recording::follow::SAMPLES_OF_A_PERIOD;
+use crate::recording::accumulator::SAMPLES_OF_A_PERIOD;
 
 /// Times the strain that the material bears at which a result is clearly outside the model's range.
 pub(super) const CLEARLY: f64 = 2.0;

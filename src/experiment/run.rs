@@ -7,7 +7,7 @@ use crate::drive::{Means, Waveform};
 use crate::effects::View;
 use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError, Unsettled};
 use crate::recording::Recording;
-use crate::recording::follow::{Course, Follower};
+use crate::recording::accumulator::{MeasureAccumulator, SamplingPlan};
 use crate::recording::measures::{Measures, recorded_jump_height};
 
 /// Steps between two calls of the observer: often enough for a progress bar, too rare to cost anything.
@@ -35,7 +35,7 @@ pub enum Control {
 pub struct Run {
     /// What was recorded.
     pub recording: Recording,
-    /// Measures of every step, seen as the effects make them seen. Of an interrupted run those are absent that belong to its end. If the run has
+    /// Measures of the run itself, whatever is recorded, seen as the effects make them seen. Of an interrupted run those are absent that belong to its end. If the run has
     /// [`trouble`](Self::trouble) they are those of another robot.
     pub measures: Measures,
     /// Whether the observer stopped the run before its end.
@@ -122,7 +122,7 @@ pub fn run(
     let mut interrupted = false;
     let mut done = engine.step();
     let start = done;
-    let (mut follower, every) = follower(experiment, start);
+    let (mut accumulator, every) = accumulator(experiment, start);
     let mut sampled = Every::new(start, every);
     let mut bent = Every::new(start, if midpoint { BEND_EVERY_SAMPLES * every } else { 1 });
     let mut observed = Every::new(start, observe_every);
@@ -154,8 +154,8 @@ pub fn run(
         }
         let last = done + 1 == experiment.steps;
         let regular = sampled.comes(done) || last;
-        if regular || follower.is_close() {
-            follow(&mut follower, time, regular, engine, (&view, origin))?;
+        if regular || accumulator.is_close() {
+            sample(&mut accumulator, time, regular, engine, (&view, origin))?;
         }
         if experiment.records(done) {
             recorder.record(time, engine)?;
@@ -170,7 +170,7 @@ pub fn run(
     recording.meta = experiment.meta(done, String::new());
     see(&mut recording, &view, origin);
     let energy = books.as_ref().map(Books::balance);
-    let mut measures = Measures { energy_error: energy.map(|energy| energy.error()), ..follower.measures() };
+    let mut measures = Measures { energy_error: energy.map(|energy| energy.error()), ..accumulator.measures() };
     if measures.jump_height_mm.is_some() {
         measures.recorded_jump_height_mm = Some(recorded_jump_height(&recording));
     }
@@ -210,14 +210,14 @@ impl Every {
 
 /// What follows a run from step `start` on: the states before its steps, as a recording of all of them would hold them. And the number of
 /// steps from one regular sample to the next.
-fn follower(experiment: &Experiment, start: u64) -> (Follower, u64) {
+fn accumulator(experiment: &Experiment, start: u64) -> (MeasureAccumulator, u64) {
     let (robot, h) = (&experiment.robot, experiment.time_step);
     let period = experiment.drive.period();
     let first_mode = analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2);
     let spacing = period.unwrap_or(f64::INFINITY).min(1.0 / first_mode) / SAMPLES;
     let every = (spacing / h).max(1.0) as u64;
     let last = experiment.steps.saturating_sub(1).max(start);
-    let course = Course {
+    let plan = SamplingPlan {
         mount: robot.mount,
         nodes: robot.joints() + 2,
         period,
@@ -226,28 +226,28 @@ fn follower(experiment: &Experiment, start: u64) -> (Follower, u64) {
         samples: ((last - start) / every + 2) as usize,
         spacing: if every > 1 { every as f64 * h } else { 0.0 },
     };
-    (Follower::new(course), every)
+    (MeasureAccumulator::new(plan), every)
 }
 
-/// Shows the robot at `time` (s) to the follower, as it is seen.
-fn follow(
-    follower: &mut Follower,
+/// Shows the robot at `time` (s) to the accumulator, as it is seen.
+fn sample(
+    accumulator: &mut MeasureAccumulator,
     time: f64,
     regular: bool,
     engine: &mut dyn Engine,
     (view, origin): (&View, f64),
 ) -> Result<(), EngineError> {
-    follower.voltages(time, engine.motor_voltages());
-    engine.places(follower.places())?;
+    accumulator.voltages(time, engine.motor_voltages());
+    engine.places(accumulator.places())?;
     if !view.is_plain() {
-        follower.places().iter_mut().for_each(|[x, z]| [*x, *z] = view.of([*x - origin, *z]));
-        if view.delay > 0.0 && follower.is_new() {
+        accumulator.places().iter_mut().for_each(|[x, z]| [*x, *z] = view.of([*x - origin, *z]));
+        if view.delay > 0.0 && accumulator.is_new() {
             // Before the first state the robot stood as in it.
-            follower.take(time, true);
-            return follow(follower, time, regular, engine, (view, origin));
+            accumulator.take(time, true);
+            return sample(accumulator, time, regular, engine, (view, origin));
         }
     }
-    follower.take(time + view.delay, regular);
+    accumulator.take(time + view.delay, regular);
     Ok(())
 }
 

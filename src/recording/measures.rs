@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Recording;
-use super::follow::{Course, Follower};
+use super::accumulator::{MeasureAccumulator, SamplingPlan};
 use crate::model::Mount;
 use crate::model::units::mm_from_cm;
 
@@ -12,8 +12,8 @@ use crate::model::units::mm_from_cm;
 const TOUCHING: f64 = 0.005;
 /// Measures of one run; those that make no sense for its mount or drive are absent.
 ///
-/// A run follows its robot at every step, so that its measures do not depend on how densely it is recorded; only what is called
-/// `recorded` does. A period that begins between two steps begins on the straight line between them.
+/// A run takes them from steps that it chooses, all of them where an extreme may come (to 0.001 mm), so that they do not depend on how densely it is
+/// recorded; only what is called `recorded` does. A period that begins between two steps begins on the straight line between them.
 ///
 /// "The last period" is the last whole period of the drive; the last half of the run, in whole periods, is taken for what needs a settled
 /// state. x and z are those of the nodes.
@@ -137,16 +137,16 @@ impl Measures {
     pub fn of(recording: &Recording, mount: Mount, period: Option<f64>) -> Self {
         let (Some(&first), Some(&last)) = (recording.time.first(), recording.time.last()) else { return Self::default() };
         let samples = recording.len();
-        let course = Course { mount, nodes: recording.nodes(), period, first, last, samples, spacing: 0.0 };
-        let mut follower = Follower::new(course);
+        let plan = SamplingPlan { mount, nodes: recording.nodes(), period, first, last, samples, spacing: 0.0 };
+        let mut accumulator = MeasureAccumulator::new(plan);
         for (record, &time) in recording.time.iter().enumerate() {
-            copy_nodes(recording, record, follower.places());
-            follower.take(time, true);
+            copy_nodes(recording, record, accumulator.places());
+            accumulator.take(time, true);
             if let Some(volts) = recording.motor_voltages.chunks_exact(recording.joints().max(1)).nth(record) {
-                follower.voltages(time, volts);
+                accumulator.voltages(time, volts);
             }
         }
-        let mut measures = follower.measures();
+        let mut measures = accumulator.measures();
         if measures.jump_height_mm.is_some() {
             measures.recorded_jump_height_mm = Some(recorded_jump_height(recording));
         }

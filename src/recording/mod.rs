@@ -1,8 +1,8 @@
 //! What a run leaves behind: a trajectory with the numbers needed to read it.
 
+pub(crate) mod accumulator;
 pub mod csv;
 pub mod definitions;
-pub(crate) mod follow;
 pub mod measures;
 mod npy;
 pub mod npz;

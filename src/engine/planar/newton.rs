@@ -79,7 +79,7 @@ impl PlanarEngine {
         Ok(())
     }
 
-    /// Notes that the lifts still changed by so much (cm/s) when the iteration ended.
+    /// Notes that the de Saxcé corrections still changed by so much (cm/s) when the iteration ended.
     #[cold]
     fn leave_unsettled(&mut self, changed: f64) {
         let step = self.step;

@@ -25,16 +25,16 @@ impl PlanarEngine {
         let step = |at: [f64; 2], lane: usize, of: &[Lanes; 2]| [at[0] + of[0].lane(lane), at[1] + of[1].lane(lane)];
         let mut right = step(left, 0, &self.kept[0]);
         (nodes[self.root], nodes[self.root + 1]) = (left, right);
-        // Of both arms the far end of the body on each rung.
-        for rung in 1..self.rungs {
-            let (of, lane) = (&self.kept[rung / 2], 2 * (rung % 2));
-            if rung <= self.root {
+        // Outwards from the root on both sides: the far ends of the two bodies of each tree level.
+        for level in 1..self.rungs {
+            let (of, lane) = (&self.kept[level / 2], 2 * (level % 2));
+            if level <= self.root {
                 left = step(left, lane, of);
-                nodes[self.root - rung] = left;
+                nodes[self.root - level] = left;
             }
-            if self.root + rung < self.count {
+            if self.root + level < self.count {
                 right = step(right, lane + 1, of);
-                nodes[self.root + rung + 1] = right;
+                nodes[self.root + level + 1] = right;
             }
         }
     }

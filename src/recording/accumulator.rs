@@ -1,8 +1,7 @@
-//! The measures of a motion that is followed from sample to sample: steps of a run, or all records of a recording.
+//! The measures of a motion, added up from sample to sample: steps of a run, or all records of a recording.
 //!
-//! A run chooses its samples itself ([`Course::spacing`]): so many steps apart that a hundred fall into a period of the drive and of an actuator's
-//! first mode. Extremes of robots that move are those of all steps nevertheless: where the next interval might bring a new one, by twice the
-//! speeds of the last, every step is a sample. What is less than 10⁻⁴ cm, or rises and falls within one interval out of slower motion, may be
+//! A run chooses its samples itself ([`SamplingPlan::spacing`]): so many steps apart that a hundred fall into a period of the drive and of an actuator's
+//! first mode. Where the next interval might bring a new extreme, by twice the speeds of the last, every step is a sample. What is less than 10⁻⁴ cm, or rises and falls within one interval out of slower motion, may be
 //! missed. Every step is a sample also before travel begins to be counted. A clamped robot's tip moves smoothly: its extremes are tops of parabolas through three samples.
 //!
 //! What belongs to a time between two samples (where a period begins) lies on the straight line between them. Shares of the time count half
@@ -17,6 +16,8 @@ use crate::model::units::mm_from_cm;
 const SAME: f64 = 0.2;
 /// Samples of a ringing tip that are kept at most: at the run's spacing the first two thousand periods of the first mode.
 const RINGING: usize = 1 << 20;
+/// Numbers that they and the voltages with them may be (128 MB).
+const RINGING_VALUES: usize = 1 << 24;
 
 /// Voltages within this share of their travel from the last one stand still: a jump with 5 % of creep does.
 const STILL: f64 = 0.1;
@@ -27,9 +28,9 @@ pub(crate) const SAMPLES_OF_A_PERIOD: f64 = 4.0;
 /// Part of an extreme that need not be followed (cm).
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// What is followed.
+/// Of what samples are taken, and when.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Course {
+pub(crate) struct SamplingPlan {
     pub mount: Mount,
     /// Number of nodes.
     pub nodes: usize,
@@ -46,8 +47,8 @@ pub(crate) struct Course {
 
 /// Takes samples of the nodes' places, and tells the measures of all that it was given. Allocates nothing after it is made.
 #[derive(Debug)]
-pub(crate) struct Follower {
-    course: Course,
+pub(crate) struct MeasureAccumulator {
+    plan: SamplingPlan,
     /// Places of the nodes (cm) at the sample being taken and at the one before.
     now: Vec<[f64; 2]>,
     before: Vec<[f64; 2]>,
@@ -103,7 +104,7 @@ struct Start {
     mean_x: Option<f64>,
 }
 
-impl Course {
+impl SamplingPlan {
     /// When the last `count` periods begin, if there are so many.
     fn periods_before_end(&self, period: f64, count: f64) -> Option<f64> {
         let start = self.last - period * count;
@@ -135,25 +136,25 @@ impl Course {
     }
 }
 
-impl Follower {
-    pub fn new(course: Course) -> Self {
-        let course = Course { period: course.period.filter(|&period| period > 0.0), ..course };
-        let period = course.period;
-        let kind = if course.mount == Mount::Clamped {
-            let half = period.and_then(|period| Some((course.resolved_half(period)?, period)));
-            let rings = if period.is_none() { course.samples.min(RINGING) } else { 0 };
+impl MeasureAccumulator {
+    pub fn new(plan: SamplingPlan) -> Self {
+        let plan = SamplingPlan { period: plan.period.filter(|&period| period > 0.0), ..plan };
+        let period = plan.period;
+        let kind = if plan.mount == Mount::Clamped {
+            let half = period.and_then(|period| Some((plan.resolved_half(period)?, period)));
+            let rings = if period.is_none() { plan.samples.min(RINGING).min(RINGING_VALUES / (plan.nodes + 1)) } else { 0 };
             Kind::Clamped(Box::new(Clamped {
                 tip: 0.0,
                 low: f64::INFINITY,
                 high: f64::NEG_INFINITY,
-                from: period.and_then(|period| course.periods_before_end(period, 1.0)).unwrap_or(course.first),
+                from: period.and_then(|period| plan.periods_before_end(period, 1.0)).unwrap_or(plan.first),
                 harmonics: half.map(|(from, period)| [(); 2].map(|()| HarmonicSums::new(1.0 / period, from))),
                 ringing: [Vec::with_capacity(rings), Vec::with_capacity(rings)],
-                voltages: [Vec::with_capacity(rings), Vec::with_capacity(rings * (course.nodes - 2))],
+                voltages: [Vec::with_capacity(rings), Vec::with_capacity(rings * (plan.nodes - 2))],
                 last: [(f64::NAN, f64::NAN); 2],
             }))
         } else {
-            let half = period.and_then(|period| Some((course.resolved_half(period)?, period)));
+            let half = period.and_then(|period| Some((plan.resolved_half(period)?, period)));
             let begin = |time: f64| Start { time, mean_x: None };
             Kind::Mobile(Box::new(Mobile {
                 jump_height: f64::NEG_INFINITY,
@@ -161,14 +162,14 @@ impl Follower {
                 lasting: [0.0; 3],
                 state: ContactState::Aerial,
                 close: false,
-                stride: period.and_then(|period| course.periods_before_end(period, 1.0)).map(begin),
-                speed: if let Some(period) = period { course.half(period).map(begin) } else { Some(begin(course.first)) },
+                stride: period.and_then(|period| plan.periods_before_end(period, 1.0)).map(begin),
+                speed: if let Some(period) = period { plan.half(period).map(begin) } else { Some(begin(plan.first)) },
                 harmonics: half.map(|(from, period)| HarmonicSums::new(1.0 / period, from)),
-                repetition: period.and_then(|period| course.repetition(period)),
+                repetition: period.and_then(|period| plan.repetition(period)),
             }))
         };
-        let places = vec![[0.0; 2]; course.nodes];
-        Self { course, now: places.clone(), before: places, time: None, kind }
+        let places = vec![[0.0; 2]; plan.nodes];
+        Self { plan, now: places.clone(), before: places, time: None, kind }
     }
 
     /// Whether nothing was taken yet.
@@ -202,7 +203,7 @@ impl Follower {
     /// Takes the sample of `time` (s), which is [`places`](Self::places): a `regular` one or one more near an extreme. Of the first sample
     /// after the end what lies on it is taken, and of later ones nothing.
     pub fn take(&mut self, mut time: f64, regular: bool) {
-        let last = self.course.last;
+        let last = self.plan.last;
         if time > last * (1.0 + 1e-12) {
             let Some(before) = self.time.filter(|&before| before < last) else { return };
             let share = (last - before) / (time - before);
@@ -215,7 +216,7 @@ impl Follower {
             Kind::Clamped(clamped) => clamped.take(time, &self.now),
             Kind::Mobile(mobile) => {
                 let before = self.time.map(|time| (time, &self.before[..]));
-                mobile.take(time, &self.now, before, regular, self.course.spacing);
+                mobile.take(time, &self.now, before, regular, self.plan.spacing);
             }
         }
         self.time = Some(time);
@@ -224,11 +225,11 @@ impl Follower {
 
     /// The measures; of a motion that did not reach its end those that need no end.
     pub fn measures(&self) -> Measures {
-        let Some(time) = self.time.filter(|&time| time > self.course.first) else { return Measures::default() };
-        let ended = time >= self.course.last * (1.0 - 1e-12);
+        let Some(time) = self.time.filter(|&time| time > self.plan.first) else { return Measures::default() };
+        let ended = time >= self.plan.last * (1.0 - 1e-12);
         match &self.kind {
-            Kind::Clamped(clamped) => clamped.measures(&self.course, ended),
-            Kind::Mobile(mobile) => mobile.measures(&self.course, &self.before, time, ended),
+            Kind::Clamped(clamped) => clamped.measures(&self.plan, ended),
+            Kind::Mobile(mobile) => mobile.measures(&self.plan, &self.before, time, ended),
         }
     }
 }
@@ -270,9 +271,9 @@ impl Clamped {
         times.get(rows.iter().rposition(|row| away(row) > STILL * range).map_or(0, |row| row + 1)).copied()
     }
 
-    fn measures(&self, course: &Course, ended: bool) -> Measures {
+    fn measures(&self, plan: &SamplingPlan, ended: bool) -> Measures {
         let mut measures = Measures { tip_deflection_mm: Some(self.tip), ..Measures::default() };
-        if course.period.is_some() && !ended {
+        if plan.period.is_some() && !ended {
             return measures;
         }
         measures.tip_amplitude_mm = Some((self.high - self.low) / 2.0);
@@ -349,18 +350,18 @@ impl Mobile {
         [&self.stride, &self.speed].into_iter().flatten().any(|start| start.mean_x.is_none() && start.time <= then)
     }
 
-    fn measures(&self, course: &Course, nodes: &[[f64; 2]], time: f64, ended: bool) -> Measures {
+    fn measures(&self, plan: &SamplingPlan, nodes: &[[f64; 2]], time: f64, ended: bool) -> Measures {
         let travel = |start: &Start| Some((mm_from_cm(mean_x(nodes) - start.mean_x?), time - start.time));
         let mut measures = Measures {
             jump_height_mm: Some(mm_from_cm(self.jump_height)),
             displacement_sum_mm: Some(mm_from_cm(self.ends[1] - self.ends[0])),
             ..Measures::default()
         };
-        if course.mount == Mount::Ground {
-            let [body, end, aerial] = self.lasting.map(|lasting| Some(lasting / (time - course.first)));
+        if plan.mount == Mount::Ground {
+            let [body, end, aerial] = self.lasting.map(|lasting| Some(lasting / (time - plan.first)));
             (measures.body_touching, measures.end_touching, measures.aerial) = (body, end, aerial);
         }
-        if course.period.is_some() && !ended {
+        if plan.period.is_some() && !ended {
             return measures;
         }
         measures.speed_mm_s = self.speed.as_ref().and_then(travel).map(|(by, lasting)| by / lasting);
