@@ -156,6 +156,14 @@ fn a_number_of_steps_that_no_run_ends_is_refused() {
 }
 
 #[test]
+fn a_time_step_that_no_time_can_be_counted_in_is_refused() {
+    for step in ["1e100", "1001", "1e-13"] {
+        let output = run(CANTILEVER, &["--set", &format!("simulation.time_step_s={step}"), "--set", "simulation.duration_s=1e101"]);
+        assert!(output.status.code() == Some(2) && words(&output).contains("simulation.time_step_s"), "{}", words(&output));
+    }
+}
+
+#[test]
 fn engines_refuse_a_step_of_zero_or_less_and_another_number_of_voltages() {
     let robot = experiment(CANTILEVER).robot;
     for step in [0.0, -1e-5, f64::NAN, f64::INFINITY] {

@@ -328,18 +328,29 @@ impl Source {
     pub fn parse(&self) -> Result<Config, ConfigError> {
         let syntax =
             |source_name: String, message: String| ConfigError::Syntax { source_name, message: message.trim_end().into() };
-        let config: Config = toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), words::toml_error(&error)))?;
+        let in_text = |error: toml::de::Error| syntax(self.name.clone(), words::toml_error(&error));
         if self.settings.is_empty() {
-            return Ok(config);
+            return toml::from_str(&self.text).map_err(in_text);
         }
-        let mut table: Table =
-            toml::from_str(&self.text).map_err(|error| syntax(self.name.clone(), words::toml_error(&error)))?;
+        let text: Table = toml::from_str(&self.text).map_err(in_text)?;
+        let mut table = text.clone();
         for setting in &self.settings {
             assign(&mut table, &setting.key, setting.toml()).map_err(|message| syntax(setting.place.clone(), message))?;
-            // Checked one by one, so that the message names the setting at fault.
-            table.clone().try_into::<Config>().map_err(|error| syntax(setting.place.clone(), words::toml_error(&error)))?;
         }
-        table.try_into().map_err(|error: toml::de::Error| syntax(self.name.clone(), words::toml_error(&error)))
+        table.try_into().map_err(|error: toml::de::Error| {
+            // Once more, one by one, so that the message names the line or the setting at fault.
+            if let Err(error) = toml::from_str::<Config>(&self.text) {
+                return in_text(error);
+            }
+            let mut table = text;
+            for setting in &self.settings {
+                let assigned = assign(&mut table, &setting.key, setting.toml());
+                if let Err(error) = assigned.and_then(|()| table.clone().try_into::<Config>().map_err(|e| words::toml_error(&e))) {
+                    return syntax(setting.place.clone(), error);
+                }
+            }
+            in_text(error)
+        })
     }
 
     /// Says where a key's value came from.

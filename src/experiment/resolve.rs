@@ -19,6 +19,9 @@ use crate::words::{not_one_of, number};
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
 /// Most steps of a run: up to here times are whole multiples of the step to a part in ten.
 const MAX_STEPS: f64 = 1e15;
+/// Time steps (s) that times of up to `MAX_STEPS` of them are distinct and drawn for.
+const MIN_TIME_STEP: f64 = 1e-12;
+const MAX_TIME_STEP: f64 = 1e3;
 const DEFAULT_ON_VOLTAGES: [f64; 5] = [520.0, 520.0, -1500.0, 520.0, 520.0];
 
 /// What may go wrong on the way: a value, or a file that a value names.
@@ -242,8 +245,9 @@ fn simulation(config: &Config, robot: &Robot, scale: f64) -> Result<(f64, u64, u
         return Err(Fault::new("simulation.time_step_s", "is missing"));
     };
     let time_step = positive("simulation.time_step_s", time_step)? * scale;
-    if time_step < 1e-12 {
-        return Err(Fault::new("simulation.time_step_s", format!("is {} s; the least is 1e-12 s", number(time_step))));
+    if !(MIN_TIME_STEP..=MAX_TIME_STEP).contains(&time_step) {
+        let message = format!("is {} s; between {MIN_TIME_STEP:e} and {MAX_TIME_STEP:e} s are possible", number(time_step));
+        return Err(Fault::new("simulation.time_step_s", message));
     }
     let in_steps = |key: &str, seconds: f64| {
         let steps = (positive(key, seconds)? / time_step).round();
