@@ -1,6 +1,6 @@
 //! An engine whose voltages pass effects on their way to the actuators.
 
-use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase, Unsettled};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::effects::Path;
 
 /// Any engine behind a [`Path`].
@@ -118,10 +118,6 @@ impl Engine for AffectedEngine {
 
     fn actuators(&self) -> usize {
         self.engine.actuators()
-    }
-
-    fn unsettled(&self) -> Option<Unsettled> {
-        self.engine.unsettled()
     }
 
     fn step(&self) -> u64 {

@@ -144,24 +144,6 @@ pub struct ClampHits {
     pub limit: f64,
 }
 
-/// Steps whose friction is not Coulomb's to the tolerance of the fixed-point iteration.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unsettled {
-    /// How many.
-    pub steps: u64,
-    /// The first of them, counting from 0.
-    pub first_step: u64,
-    /// The last.
-    pub last_step: u64,
-    /// Largest change of the de Saxcé correction that was left (cm/s), the tolerance being [`Unsettled::TOLERANCE`].
-    pub largest: f64,
-}
-
-impl Unsettled {
-    /// Change of the de Saxcé correction at which the iteration is done (cm/s).
-    pub const TOLERANCE: f64 = planar::LIFT_ENOUGH;
-}
-
 /// A force of the floor on a link during the last step, in the plane of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
@@ -281,11 +263,6 @@ pub trait Engine {
 
     /// Number of actuators.
     fn actuators(&self) -> usize;
-
-    /// Whether, when and how often the iteration for Coulomb's friction ended without a solution.
-    fn unsettled(&self) -> Option<Unsettled> {
-        None
-    }
 
     /// Number of steps taken.
     fn step(&self) -> u64;

@@ -2,15 +2,11 @@
 
 use super::{EngineKind, Experiment};
 use crate::analytic;
-use crate::engine::Unsettled;
 use crate::model::Robot;
 use crate::recording::accumulator::SAMPLES_OF_A_PERIOD;
 
 /// Times the strain that the material bears at which a result is clearly outside the model's range.
 pub(super) const CLEARLY: f64 = 2.0;
-/// What the iteration for Coulomb's friction may leave (cm/s) for measures to be given.
-pub(super) const UNSETTLED_TROUBLE: f64 = 10.0 * Unsettled::TOLERANCE;
-
 /// The largest joint angle of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bending {
@@ -51,19 +47,6 @@ impl Bending {
             )
         })
     }
-}
-
-/// What the iteration for Coulomb's friction has left.
-pub(super) fn unsettled(left: Unsettled, experiment: &Experiment) -> String {
-    format!(
-        "in {} steps, first at step {}, t = {:.6} s, the iteration for Coulomb's friction ended {:.2} cm/s short of its solution (tolerance \
-         {} cm/s); try a smaller time step",
-        left.steps,
-        left.first_step,
-        left.first_step as f64 * experiment.time_step,
-        left.largest,
-        Unsettled::TOLERANCE
-    )
 }
 
 /// What is wrong with a time step on Bullet that is longer than the largest stable one (s), and which to take.

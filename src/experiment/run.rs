@@ -1,11 +1,11 @@
 //! The loop over steps.
 
 use super::Experiment;
-use super::range::{self, Bending, CLEARLY, UNSETTLED_TROUBLE};
+use super::range::{self, Bending, CLEARLY};
 use crate::analytic;
 use crate::drive::{Means, Waveform};
 use crate::effects::View;
-use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError, Unsettled};
+use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
 use crate::recording::accumulator::{MeasureAccumulator, SamplingPlan};
 use crate::recording::measures::{Measures, recorded_jump_height};
@@ -44,8 +44,6 @@ pub struct Run {
     pub clamp_hits: Option<ClampHits>,
     /// The largest stable time step (s), if the engine is explicit and its step was longer.
     pub unstable: Option<f64>,
-    /// Whether friction was not always solved for to its tolerance.
-    pub unsettled: Option<Unsettled>,
     /// The most that a joint was bent.
     pub bending: Bending,
     /// Where energy came from and where it went.
@@ -79,18 +77,13 @@ impl Run {
             )
         });
         let bending = self.bending.beyond(&experiment.robot, CLEARLY);
-        let unsettled =
-            self.unsettled.filter(|left| left.largest > UNSETTLED_TROUBLE).map(|left| range::unsettled(left, experiment));
-        aliased.into_iter().chain(unstable).chain(clamp).chain(bending).chain(unsettled).chain(energy).collect()
+        aliased.into_iter().chain(unstable).chain(clamp).chain(bending).chain(energy).collect()
     }
 
     /// What is to be known of measures that are given: nothing that [`trouble`](Self::trouble) says.
     pub fn warnings(&self, experiment: &Experiment) -> Vec<String> {
         let bending = |times| self.bending.beyond(&experiment.robot, times);
-        let bending = if bending(CLEARLY).is_none() { bending(1.0) } else { None };
-        let unsettled =
-            self.unsettled.filter(|left| left.largest <= UNSETTLED_TROUBLE).map(|left| range::unsettled(left, experiment));
-        bending.into_iter().chain(unsettled).collect()
+        if bending(CLEARLY).is_none() { bending(1.0).into_iter().collect() } else { Vec::new() }
     }
 }
 
@@ -181,7 +174,6 @@ pub fn run(
         clamp_hits: engine.clamp_hits(),
         unstable: range::unstable(experiment, engine.hardening_curvature()),
         audited: energy.is_some(),
-        unsettled: engine.unsettled(),
         bending,
         energy: energy.unwrap_or_default(),
     })

@@ -8,6 +8,7 @@
 
 use wide::f64x2;
 
+use super::FrictionModel;
 use super::lanes::fma;
 use super::recursion::{Arms, Spatials};
 
@@ -34,6 +35,7 @@ pub(super) struct Law {
     /// 1/R (g).
     stiffness: f64,
     frictionless: bool,
+    pub(super) friction: FrictionModel,
 }
 
 impl Law {
@@ -42,13 +44,19 @@ impl Law {
         (self.time_step, LARGEST_CHANGE * self.time_step)
     }
 
-    pub(super) fn new(time_step: f64, weight: f64, body_mass: f64) -> Self {
-        Self { time_step, per_step: 1.0 / time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false }
+    /// 1/R (g).
+    pub(super) fn stiffness(&self) -> f64 {
+        self.stiffness
+    }
+
+    pub(super) fn new(time_step: f64, weight: f64, body_mass: f64, friction: FrictionModel) -> Self {
+        Self { time_step, per_step: 1.0 / time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false, friction }
     }
 
     /// A frictionless floor for displacements: no velocity before, everything near.
     pub(super) fn statics(stiffness: f64) -> Self {
-        Self { time_step: 1.0, per_step: 1.0, weight: 1.0, stiffness, frictionless: true }
+        let friction = FrictionModel::Convex;
+        Self { time_step: 1.0, per_step: 1.0, weight: 1.0, stiffness, frictionless: true, friction }
     }
 }
 
@@ -131,8 +139,8 @@ pub(super) struct Corners {
     touch: Touch,
     /// The states that the newest solution asks for.
     asked: Touch,
-    /// Vertical velocity that has been taken off the target's end (cm/s).
-    lift: f64x2,
+    /// Those whose states still changed after some iterations of Newton's method for Coulomb's law.
+    unsettled: [bool; 2],
     grip: Grip,
     /// Mean velocity w* that stops them on the floor at the end (cm/s).
     target: [f64x2; 2],
@@ -176,7 +184,7 @@ impl Corners {
         self.look = look;
         self.near = near;
         self.arm = arm;
-        self.lift = f64x2::ZERO;
+        self.unsettled = [false; 2];
         self.target = [before[0] * (f64x2::ONE - weight), fma(weight, end - before[1], before[1])];
     }
 
@@ -196,21 +204,6 @@ impl Corners {
         let fast = speed.simd_lt(f64x2::splat(-LEAST_BOUNCE));
         let bounced = speed + f64x2::splat(law.weight) * (f64x2::splat(-restitution) * speed - speed);
         self.target[1] = (reach & fast).select(bounced, self.target[1]);
-    }
-
-    /// Takes off the lift that the convex model gives corners which slide with their bodies' motion `mean` (De Saxcé's correction), by a step
-    /// of the fixed-point iteration that is damped by 1/(1 + μ); returns how far the lifts changed at most (cm/s).
-    #[inline(always)]
-    pub(super) fn take_off_lift(&mut self, mean: &Spatials, law: &Law) -> f64 {
-        let weight = f64x2::splat(law.weight);
-        let mu = self.grip.friction;
-        let sliding = (self.velocity_in(mean)[0] - self.target[0]) / weight;
-        let by = (mu * sliding.abs() - self.lift) / (f64x2::ONE + mu);
-        let by = by & (self.touch.sticks() | self.touch.slides());
-        self.lift += by;
-        self.target[1] -= weight * by;
-        let [a, b] = by.abs().to_array();
-        a.max(b)
     }
 
     /// Whether neither touches, of corners near the floor.
@@ -238,7 +231,8 @@ impl Corners {
         let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
         let mu = self.grip.friction;
         let sideways = pull[0].abs();
-        let pressed = fma(mu, sideways, pull[1]);
+        let coulomb = law.friction == FrictionModel::Coulomb;
+        let pressed = if coulomb { pull[1] } else { fma(mu, sideways, pull[1]) };
         let touches = pressed.simd_gt(f64x2::ZERO) & self.near;
         if !touches.any() {
             // So most corners near the floor.
@@ -246,7 +240,7 @@ impl Corners {
         }
         let sticks = sideways.simd_le(mu * pull[1]) & touches;
         let slides = touches & !sticks;
-        let normal = pressed * self.grip.share;
+        let normal = if coulomb { pressed } else { pressed * self.grip.share };
         let push = (mu * normal).copysign(pull[0]);
         let impulse = [(sticks & pull[0]) | (slides & push), (sticks & pull[1]) | (slides & normal)];
         (Touch::new(sticks, slides, pull[0]), impulse)
@@ -272,7 +266,7 @@ impl Corners {
         let stiffness = f64x2::splat(law.stiffness);
         let [ax, az] = self.arm;
         let [tx, tz] = self.target;
-        let Arms { inertia, force } = bodies;
+        let Arms { inertia, lower, force } = bodies;
         let sticks = self.touch.sticks();
         if sticks.any() {
             let k = sticks & stiffness;
@@ -281,12 +275,28 @@ impl Corners {
             inertia[2] = fma(k, ax, inertia[2]);
             inertia[3] += k;
             inertia[5] += k;
+            lower[0] = fma(-k, az, lower[0]);
+            lower[1] = fma(k, ax, lower[1]);
             force[0] = fma(k, fma(ax, tz, -(az * tx)), force[0]);
             force[1] = fma(k, tx, force[1]);
             force[2] = fma(k, tz, force[2]);
         }
         let slides = self.touch.slides();
-        if slides.any() {
+        if slides.any() && law.friction == FrictionModel::Coulomb {
+            // The impulse (±μ, 1) λ_n, with λ_n by the velocity across the floor alone.
+            let k = slides & stiffness;
+            let along = self.grip.friction.copysign(self.touch.0);
+            let by = [fma(-az, along, ax), along, f64x2::ONE].map(|part| k * part);
+            inertia[0] = fma(by[0], ax, inertia[0]);
+            inertia[2] += by[0];
+            inertia[4] += by[1];
+            inertia[5] += by[2];
+            lower[0] = fma(by[1], ax, lower[0]);
+            lower[1] = fma(by[2], ax, lower[1]);
+            for i in 0..3 {
+                force[i] = fma(by[i], tz, force[i]);
+            }
+        } else if slides.any() {
             let k = slides & stiffness;
             let [dx, dz] = self.slide(self.touch);
             // Velocity of the corner along d is row · (ω, v).
@@ -318,11 +328,75 @@ impl Corners {
         !self.asked.0.simd_ne(self.touch.0).any()
     }
 
+    /// How far the impulses (dyn·s) of the pieces that the bodies' motion `mean` was solved with, which has just been asked whether it
+    /// [`agrees`](Self::agrees), are from the law's at most.
+    pub(super) fn mismatch(&self, mean: &Spatials, law: &Law) -> f64 {
+        let v = self.velocity_in(mean);
+        let stiffness = f64x2::splat(law.stiffness);
+        let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
+        let (sticks, slides) = (self.touch.sticks(), self.touch.slides());
+        let push = (self.grip.friction * pull[1]).copysign(self.touch.0);
+        let piece = [(sticks & pull[0]) | (slides & push), (sticks | slides) & pull[1]];
+        (0..2).flat_map(|k| (piece[k] - self.impulse[k]).abs().to_array()).fold(0.0, f64::max)
+    }
+
+    /// The largest part of the law's impulses (dyn·s).
+    pub(super) fn largest_impulse(&self) -> f64 {
+        self.impulse.iter().flat_map(|part| part.abs().to_array()).fold(0.0, f64::max)
+    }
+
+    /// Mean velocity (cm/s) of the corner in a lane less what stops it on the floor.
+    pub(super) fn excess(&self, lane: usize, mean: &Spatials) -> [f64; 2] {
+        let v = self.velocity_in(mean);
+        [0, 1].map(|k| (v[k] - self.target[k]).to_array()[lane])
+    }
+
+    /// Of the corner in a lane, if it is near the floor: arm (cm) and coefficient of friction.
+    pub(super) fn near(&self, lane: usize) -> Option<([f64; 2], f64)> {
+        let is_near = self.near.to_array()[lane].to_bits() != 0;
+        is_near.then(|| (self.arm.map(|part| part.to_array()[lane]), self.grip.friction.to_array()[lane]))
+    }
+
+    /// Sets the state of the corner in a lane (see [`Touch`]).
+    pub(super) fn set_touch(&mut self, lane: usize, touch: f64) {
+        let mut both = self.touch.0.to_array();
+        both[lane] = touch;
+        self.touch = Touch(f64x2::new(both));
+    }
+
+    /// Whether one of them slides.
+    #[inline(always)]
+    pub(super) fn slides(&self) -> bool {
+        self.touch.slides().any()
+    }
+
     /// Takes the bodies' motion `mean`, which has just been asked whether it [`agrees`](Self::agrees), as iterate.
     #[inline(always)]
     pub(super) fn accept(&mut self, mean: &Spatials) {
         self.velocity = self.velocity_in(mean);
         self.touch = self.asked;
+    }
+
+    /// Takes the states that the newest solution asks for, under Coulomb's law: but corners that slide and are asked to slide the other way stick,
+    /// for the pieces in between are so narrow that they are passed over otherwise. Those that change may be noted as `unsettled`.
+    #[inline(always)]
+    pub(super) fn take_states(&mut self, unsettled: bool) {
+        if unsettled {
+            let (asked, before) = (self.asked.0.to_array(), self.touch.0.to_array());
+            (0..2).for_each(|lane| self.unsettled[lane] |= asked[lane] != before[lane]);
+        }
+        let turned = self.asked.slides() & self.asked.0.simd_eq(-self.touch.0);
+        self.touch = Touch(turned.select(f64x2::ONE, self.asked.0));
+    }
+
+    /// Those whose states were not settled by Newton's method.
+    pub(super) fn unsettled(&self) -> [bool; 2] {
+        self.unsettled
+    }
+
+    /// Notes both as unsettled.
+    pub(super) fn unsettle(&mut self) {
+        self.unsettled = [true; 2];
     }
 
     /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).
@@ -370,7 +444,7 @@ mod tests {
     /// then these must be linear in between.
     #[test]
     fn corners_that_stay_on_their_pieces_are_linear_on_the_way() {
-        let law = Law::new(1e-4, 0.5, 1.0);
+        let law = Law::new(1e-4, 0.5, 1.0, FrictionModel::Convex);
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
         let start = Corners { near, ..Corners::new(Grip::new(f64x2::splat(0.5))) };
         let (mut stay, mut change) = (0, 0);
@@ -405,7 +479,7 @@ mod tests {
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
         for friction in [0.0, 0.5] {
             let corners = Corners { near, ..Corners::new(Grip::new(f64x2::splat(friction))) };
-            let (touch, impulse) = corners.law([f64x2::ZERO, f64x2::ONE], &Law::new(1e-4, 0.5, 1.0));
+            let (touch, impulse) = corners.law([f64x2::ZERO, f64x2::ONE], &Law::new(1e-4, 0.5, 1.0, FrictionModel::Convex));
             assert_eq!((touch.0.to_array(), impulse.map(f64x2::to_array)), ([0.0; 2], [[0.0; 2]; 2]), "{friction}");
         }
     }

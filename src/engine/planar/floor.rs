@@ -169,6 +169,37 @@ impl Floor {
         start..end
     }
 
+    /// Whether a listed corner slides.
+    #[inline(always)]
+    pub(super) fn slides(&self) -> bool {
+        self.near.iter().any(|place| self.corners[*place].slides())
+    }
+
+    /// The places of all listed corners and the corners.
+    pub(super) fn listed(&self) -> impl Iterator<Item = (usize, &Corners)> {
+        self.near.iter().map(|place| (*place, &self.corners[*place]))
+    }
+
+    /// Mean velocity (cm/s) of a corner less what stops it on the floor.
+    pub(super) fn excess(&self, place: usize, lane: usize, quads: &[Quad]) -> [f64; 2] {
+        self.corners[place].excess(lane, &mean_at(place, quads))
+    }
+
+    /// Sets the state of a corner.
+    pub(super) fn set_touch(&mut self, place: usize, lane: usize, touch: f64) {
+        self.corners[place].set_touch(lane, touch);
+    }
+
+    /// Notes both corners of those places as unsettled of which `which` holds.
+    pub(super) fn unsettle(&mut self, which: impl Fn(&Corners) -> bool) {
+        for place in &self.near {
+            let corners = &mut self.corners[*place];
+            if which(corners) {
+                corners.unsettle();
+            }
+        }
+    }
+
     /// Listed corners, for the walk to the root.
     #[inline(always)]
     pub(super) fn inwards(&self, among: &Range<usize>) -> Inwards<'_> {

@@ -43,6 +43,7 @@ mod contact;
 mod floor;
 mod lanes;
 mod newton;
+mod pivoting;
 mod places;
 mod recursion;
 mod statics;
@@ -55,10 +56,9 @@ use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::Law;
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
-pub(super) use self::newton::LIFT_ENOUGH;
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
-use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase, Unsettled};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
 use crate::model::{Mount, Robot};
@@ -113,7 +113,6 @@ pub struct PlanarEngine {
     velocity: [f64; 2],
     /// Without corners but for robots on the ground.
     floor: Floor,
-    friction: FrictionModel,
     /// Mean motions of the reference points in the iterate of the contact problem.
     iterate: Vec<[Lanes; 3]>,
     /// Newton steps after which a contact problem is given up.
@@ -139,7 +138,6 @@ pub struct PlanarEngine {
     iterations: u64,
     /// Energy that the weight of the step's end has taken so far (erg).
     numerical_loss: f64,
-    unsettled: Option<Unsettled>,
 }
 
 impl PlanarEngine {
@@ -238,14 +236,13 @@ impl PlanarEngine {
             } else {
                 Floor::default()
             },
-            friction: FrictionModel::default(),
             iterate: vec![[Lanes::ZERO; 3]; quads.len()],
             largest_steps: LARGEST_STEPS + MORE_PER_BODY * count as u32,
             outside: vec![Outside::default(); blocks],
             asking: vec![false; blocks],
             quads,
             rungs,
-            law: Law::new(time_step, weight, mass / count as f64),
+            law: Law::new(time_step, weight, mass / count as f64, FrictionModel::default()),
             weight,
             level: Level::new(),
             step: 0,
@@ -255,7 +252,6 @@ impl PlanarEngine {
             turns: [0.0; 2],
             iterations: 0,
             numerical_loss: 0.0,
-            unsettled: None,
         })
     }
 
@@ -266,7 +262,7 @@ impl PlanarEngine {
 
     /// Chooses how sliding corners are treated.
     pub fn set_friction_model(&mut self, friction: FrictionModel) {
-        self.friction = friction;
+        self.law.friction = friction;
     }
 
     /// Lets the floor rise by `angle` (rad) along +x: in its axes gravity is g (−sin, −cos). The books of energy know level floors only.
@@ -722,10 +718,6 @@ impl Engine for PlanarEngine {
 
     fn actuators(&self) -> usize {
         (self.count - 1) / self.motors_per_actuator
-    }
-
-    fn unsettled(&self) -> Option<Unsettled> {
-        self.unsettled
     }
 
     fn step(&self) -> u64 {

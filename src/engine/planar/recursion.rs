@@ -173,10 +173,12 @@ fn turned<S: Simd>([x, z]: [Four<S>; 2], by: Four<S>) -> [Four<S>; 2] {
     [fma(-sin, fma(t, x, z), x), fma(sin, fma(-t, z, x), z)]
 }
 
-/// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms.
+/// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms; and the inertia's entries 10, 20, 21 where corners slide by Coulomb's
+/// law, whose impulse is not along what it depends on. They are zero and not read where none does.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Arms {
     pub(super) inertia: [f64x2; 6],
+    pub(super) lower: [f64x2; 3],
     pub(super) force: Spatials,
 }
 
@@ -184,6 +186,7 @@ pub(super) struct Arms {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Articulated {
     inertia: [f64; 6],
+    lower: [f64; 3],
     force: Spatial,
 }
 
@@ -202,7 +205,10 @@ impl Arms {
     /// With c the first column of the inertia I outside, what is felt of it is I − c cᵀ/D, of which the first column is c · implicit/D:
     /// nothing is lost where a joint is soft. All that can be made of I before 1/D is known is made apart, for 1/D is waited for.
     #[inline(always)]
-    fn take(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, rung: usize) {
+    fn take<const SKEW: bool>(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, rung: usize) {
+        if SKEW {
+            return self.take_skew(through, across, quad, rung);
+        }
         let Joints { inverse, implicit, own } = *through;
         let [wx, wz] = [-across[1], across[0]];
         let [c0, c1, c2, i11, i12, i22] = self.inertia;
@@ -230,10 +236,47 @@ impl Arms {
         ];
     }
 
+    /// The same where the inertia is not symmetric: with its first row r, what is felt of it is I − c rᵀ/D.
+    #[inline(always)]
+    fn take_skew(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, rung: usize) {
+        let Joints { inverse, implicit, own } = *through;
+        let [wx, wz] = [-across[1], across[0]];
+        let ([c0, r1, r2, i11, i12, i22], [c1, c2, i21]) = (self.inertia, self.lower);
+        let [half_x, half_z] = pair(&quad.half, rung);
+        let (mass, inertia) = (quad.mass.rung(rung), quad.inertia_at_reference.rung(rung));
+        let momentum = pair(&quad.momentum, rung);
+        let squares = fma(wx * wx, i11, fma(wz * wz, i22, wx * wz * (i12 + i21)));
+        let [row, column] = [fma(wx, r1, wz * r2), fma(wx, c1, wz * c2)];
+        let [soft_row, soft_column] = [implicit - row, implicit - column];
+        let felt = fma(implicit, c0 + (row + column), -(row * column));
+        self.inertia = [
+            fma(felt, inverse, inertia + squares),
+            fma(r1 * soft_column, inverse, fma(-mass, half_z, fma(wx, i11, wz * i21))),
+            fma(r2 * soft_column, inverse, fma(mass, half_x, fma(wx, i12, wz * i22))),
+            fma(-c1 * r1, inverse, i11 + mass),
+            fma(-c1 * r2, inverse, i12),
+            fma(-c2 * r2, inverse, i22 + mass),
+        ];
+        self.lower = [
+            fma(c1 * soft_row, inverse, fma(-mass, half_z, fma(wx, i11, wz * i12))),
+            fma(c2 * soft_row, inverse, fma(mass, half_x, fma(wx, i21, wz * i22))),
+            fma(-c2 * r1, inverse, i21),
+        ];
+        let [turn, x, z] = self.force;
+        self.force = [
+            fma(-(c0 + column), own, momentum[0] + fma(wx, x, fma(wz, z, turn))),
+            fma(-c1, own, momentum[1] + x),
+            fma(-c2, own, momentum[2] + z),
+        ];
+    }
+
     /// Adds what corners do to the bodies of a rung.
     #[inline(always)]
-    fn touch(&mut self, by: &Self) {
+    fn touch<const SKEW: bool>(&mut self, by: &Self) {
         (0..6).for_each(|k| self.inertia[k] += by.inertia[k]);
+        if SKEW {
+            (0..3).for_each(|k| self.lower[k] += by.lower[k]);
+        }
         (0..3).for_each(|k| self.force[k] += by.force[k]);
     }
 
@@ -254,10 +297,11 @@ impl Arms {
 
     /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
     #[inline(always)]
-    fn at_root(mut self, through: &Joints, root: &Quad) -> Articulated {
-        self.take(through, root_ends(root), root, 0);
+    fn at_root<const SKEW: bool>(mut self, through: &Joints, root: &Quad) -> Articulated {
+        self.take::<SKEW>(through, root_ends(root), root, 0);
         Articulated {
             inertia: std::array::from_fn(|k| self.inertia[k].reduce_add()),
+            lower: if SKEW { std::array::from_fn(|k| self.lower[k].reduce_add()) } else { [0.0; 3] },
             force: std::array::from_fn(|k| self.force[k].reduce_add()),
         }
     }
@@ -280,17 +324,19 @@ impl Articulated {
     /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned;
     /// without fractions, so that no division waits for another.
     #[inline(always)]
-    fn motion(&self) -> Spatial {
+    fn motion<const SKEW: bool>(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
+        let [i10, i20, i21] = if SKEW { self.lower } else { [i01, i02, i12] };
         let [turn, x, z] = self.force;
         // a·b − c·d.
         let less = |a: f64, b: f64, c: f64, d: f64| a.mul_add(b, -(c * d));
-        let (a, b, c) = (less(i00, i22, i02, i02), less(i01, i22, i12, i02), less(i11, i22, i12, i12));
+        let (a, b, c) = (less(i00, i22, i02, i20), less(i01, i22, i02, i21), less(i11, i22, i12, i21));
+        let d = if SKEW { less(i10, i22, i12, i20) } else { b };
         let (turn, x) = (less(turn, i22, i02, z), less(x, i22, i12, z));
-        let spin = less(turn, c, b, x) / less(a, c, b, b);
-        let along = less(x, 1.0 / c, spin, b / c);
+        let spin = less(turn, c, b, x) / less(a, c, b, d);
+        let along = less(x, 1.0 / c, spin, d / c);
         let fall = 1.0 / i22;
-        [spin, along, less(z, fall, spin, i02 * fall) - along * (i12 * fall)]
+        [spin, along, less(z, fall, spin, i20 * fall) - along * (i21 * fall)]
     }
 }
 
@@ -317,20 +363,28 @@ pub(super) struct Outside {
 
 /// The chain as it is felt at the root, which is all of it, and the root's motion.
 #[inline(always)]
-fn root_motion(chain: Arms, through: &Joints, root: &Quad, hold: Hold, mut floor: Inwards, law: &Law) -> (Articulated, Spatial) {
+fn root_motion<const SKEW: bool>(
+    chain: Arms,
+    through: &Joints,
+    root: &Quad,
+    hold: Hold,
+    mut floor: Inwards,
+    law: &Law,
+) -> (Articulated, Spatial) {
     if hold == Hold::Clamped {
         return Default::default();
     }
-    let mut whole = chain.at_root(through, root);
+    let mut whole = chain.at_root::<SKEW>(through, root);
     if hold == Hold::Hinged {
         let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
         return (whole, [turn, 0.0, 0.0]);
     }
     if let Some(by) = floor.take(0, law) {
         (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
+        (0..3).for_each(|k| whole.lower[k] += by.lower[k].to_array()[0]);
         (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
     }
-    (whole, whole.motion())
+    (whole, whole.motion::<SKEW>())
 }
 
 /// Mean motions u of the chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as their states say.
@@ -338,7 +392,7 @@ fn root_motion(chain: Arms, through: &Joints, root: &Quad, hold: Hold, mut floor
 /// Of the `rungs` of some blocks only: bodies further in move as they did, and those further out are felt as they last were. What is
 /// felt goes to `outside`, by block, unless it is empty. Returns the chain as it is felt at the root, if that is among `rungs`.
 #[inline(always)]
-pub(super) fn solve(
+pub(super) fn solve<const SKEW: bool>(
     quads: &mut [Quad],
     rungs: Range<usize>,
     hold: Hold,
@@ -357,9 +411,9 @@ pub(super) fn solve(
         }
         for k in (start.max(1)..end).rev() {
             let (quad, rung) = (&mut quads[k / 2], k % 2);
-            chain.take(&through, pair(&quad.across, rung), quad, rung);
+            chain.take::<SKEW>(&through, pair(&quad.across, rung), quad, rung);
             if let Some(by) = floor.take(k, law) {
-                chain.touch(&by);
+                chain.touch::<SKEW>(&by);
             }
             through = chain.joints(quad, rung);
         }
@@ -374,7 +428,7 @@ pub(super) fn solve(
     } else {
         let root = &mut quads[0];
         let motion;
-        (whole, motion) = root_motion(chain, &through, root, hold, floor, law);
+        (whole, motion) = root_motion::<SKEW>(chain, &through, root, hold, floor, law);
         [turn, x, z] = motion.map(f64x2::splat);
         set(root, 0, [turn, x, z]);
         across = root_ends(root);

@@ -1,0 +1,210 @@
+//! A step's contact by Lemke's method, for the corners over whose states Newton's method goes round in circles.
+//!
+//! With W the corners' velocities per impulse, the law's compliance among them, and q what is left of gaps and sliding without these impulses,
+//! each corner's normal impulse λ, tangential impulse β₊ − β₋ and sliding speed γ solve
+//!
+//! ```text
+//! 0 ≤ W_nn λ + W_nt (β₊ − β₋) + q_n              ⊥  λ  ≥ 0
+//! 0 ≤ ±(W_tn λ + W_tt (β₊ − β₋) + q_t) + γ       ⊥  β± ≥ 0
+//! 0 ≤ μ λ − β₊ − β₋                              ⊥  γ  ≥ 0
+//! ```
+//!
+//! The other corners stay in their states, which are checked afterwards. If that fails, more corners are taken, in the end all: W is positive
+//! definite then and the matrix copositive, so that Lemke's method with lexicographic pivots ends in a solution. There may be several: this
+//! is the one that its path from open corners comes to.
+//!
+//! D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth. Eng. 39 (1996); M. Anitescu and F. A. Potra, Nonlinear Dynamics 14 (1997); R. W. Cottle,
+//! J.-S. Pang and R. E. Stone, *The Linear Complementarity Problem* (1992), section 4.4.
+
+use fearless_simd::Simd;
+
+use super::PlanarEngine;
+use super::contact::{Corners, Law};
+
+/// Pivots per unknown after which rounding must have led in circles. Seen: up to one per unknown.
+const LARGEST_PIVOTS: usize = 20;
+/// Entries of a column below this share of its largest are zero.
+const ZERO: f64 = 1e-11;
+/// What is left of the artificial velocity that counts as none, as a share of what it begins with: corners side by side leave up to 1.5·10⁻¹⁰.
+const DONE: f64 = 1e-8;
+
+/// A corner of the problem.
+struct Corner {
+    place: usize,
+    lane: usize,
+    arm: [f64; 2],
+    friction: f64,
+}
+
+impl PlanarEngine {
+    /// Solves the step's contact where Newton's method has left corners unsettled; whether it is solved. Out of line, for few steps come here.
+    #[inline(never)]
+    pub(super) fn solve_unsettled<S: Simd>(&mut self, simd: S, law: &Law) -> bool {
+        let more: [fn(&Corners) -> bool; 4] = [|_| false, Corners::slides, |corners| !corners.is_open(), |_| true];
+        let (rungs, all) = (0..self.rungs, self.floor.all());
+        let mut before = 0;
+        more.into_iter().any(|which| {
+            self.floor.unsettle(which);
+            let corners = self.unsettled_corners();
+            // The same problem again has the same answer.
+            if std::mem::replace(&mut before, corners.len()) == corners.len() {
+                return false;
+            }
+            let pivoted = simd.vectorize(
+                #[inline(always)]
+                || self.pivot(&corners, law),
+            );
+            pivoted && self.newton_steps(simd, rungs.clone(), all.clone(), self.largest_steps, law).1
+        })
+    }
+
+    fn unsettled_corners(&self) -> Vec<Corner> {
+        let of_place = |(place, corners): (usize, &'_ Corners)| {
+            let unsettled = corners.unsettled();
+            [0, 1].map(|lane| {
+                let near = corners.near(lane).filter(|_| unsettled[lane]);
+                near.map(|(arm, friction)| Corner { place, lane, arm, friction })
+            })
+        };
+        self.floor.listed().flat_map(of_place).flatten().collect()
+    }
+
+    /// Sets the states of `corners` to those of a solution with all others in their states; whether there is one.
+    #[inline(always)]
+    fn pivot(&mut self, corners: &[Corner], law: &Law) -> bool {
+        let (rungs, among) = (0..self.rungs, self.floor.all());
+        let count = corners.len();
+        corners.iter().for_each(|corner| self.floor.set_touch(corner.place, corner.lane, 0.0));
+        self.solve_for_states(&rungs, &among, law);
+        let free: Vec<[f64; 2]> =
+            corners.iter().map(|corner| self.floor.excess(corner.place, corner.lane, &self.quads)).collect();
+        // Impulses in units of a body's mass: the matrix is of order one then. By rows, of x and z of each corner.
+        let unit = self.mass / self.count as f64;
+        let give = unit / law.stiffness();
+        let mut w = vec![0.0; 4 * count * count];
+        for (j, Corner { place, lane, arm, .. }) in corners.iter().enumerate() {
+            let (quad, lane) = (place / 4, 2 * (place / 2 % 2) + lane);
+            for (direction, impulse) in [[-arm[1], 1.0, 0.0], [arm[0], 0.0, 1.0]].into_iter().enumerate() {
+                let before = self.quads[quad].momentum;
+                for (momentum, part) in self.quads[quad].momentum.iter_mut().zip(impulse) {
+                    momentum.set_lane(lane, momentum.lane(lane) + unit * part);
+                }
+                self.solve_for_states(&rungs, &among, law);
+                self.quads[quad].momentum = before;
+                for (i, (corner, free)) in corners.iter().zip(&free).enumerate() {
+                    let with = self.floor.excess(corner.place, corner.lane, &self.quads);
+                    (0..2).for_each(|k| w[2 * count * (2 * i + k) + 2 * j + direction] = with[k] - free[k]);
+                }
+                w[(2 * count + 1) * (2 * j + direction)] += give;
+            }
+        }
+        // λ of all corners, then β₊, β₋ and γ.
+        let [normal, plus, minus, speed] = [0, 1, 2, 3].map(|block| block * count);
+        let n = 4 * count;
+        let mut matrix = vec![0.0; n * n];
+        let mut right = vec![0.0; n];
+        for i in 0..count {
+            for j in 0..count {
+                let [[tt, tn], [nt, nn]] = [0, 1].map(|a| [0, 1].map(|b| w[2 * count * (2 * i + a) + 2 * j + b]));
+                for (row, [on_normal, on_plus]) in [(normal, [nn, nt]), (plus, [tn, tt]), (minus, [-tn, -tt])] {
+                    for (column, value) in [(normal, on_normal), (plus, on_plus), (minus, -on_plus)] {
+                        matrix[n * (row + i) + column + j] = value;
+                    }
+                }
+            }
+            for (row, column, value) in [
+                (plus, speed, 1.0),
+                (minus, speed, 1.0),
+                (speed, normal, corners[i].friction),
+                (speed, plus, -1.0),
+                (speed, minus, -1.0),
+            ] {
+                matrix[n * (row + i) + column + i] = value;
+            }
+            (right[normal + i], right[plus + i], right[minus + i]) = (free[i][1], free[i][0], -free[i][0]);
+        }
+        let Some(solution) = lemke(&matrix, &right) else { return false };
+        for (i, corner) in corners.iter().enumerate() {
+            let state = match (solution[normal + i] > 0.0, solution[speed + i] > 0.0) {
+                (false, _) => 0.0,
+                (true, false) => 1.0,
+                (true, true) if solution[plus + i] >= solution[minus + i] => 2.0,
+                (true, true) => -2.0,
+            };
+            self.floor.set_touch(corner.place, corner.lane, state);
+        }
+        true
+    }
+}
+
+/// A solution z of 0 ≤ w = M z + q ⊥ z ≥ 0 by Lemke's method, with M by rows; none if its path ends on a ray.
+#[inline(always)]
+fn lemke(matrix: &[f64], right: &[f64]) -> Option<Vec<f64>> {
+    let n = right.len();
+    let largest = -right.iter().copied().fold(0.0, f64::min);
+    if largest == 0.0 {
+        return Some(vec![0.0; n]);
+    }
+    // Variables w (0 to n), z (n to 2n) and z₀ (2n) with w = M z + z₀ + q. Each row: a basic one is the row's end less the row times the others.
+    let (artificial, width) = (2 * n, n + 2);
+    let mut rows = vec![0.0; n * width];
+    for (i, row) in rows.chunks_exact_mut(width).enumerate() {
+        row[..n].iter_mut().zip(&matrix[n * i..]).for_each(|(to, from)| *to = -from);
+        (row[n], row[n + 1]) = (-1.0, right[i]);
+    }
+    let (mut basic, mut others): (Vec<usize>, Vec<usize>) = ((0..n).collect(), (n..=2 * n).collect());
+    let mut scaled = vec![0.0; width];
+    let (mut leaving, mut entering) = (first_row(&rows, &basic, &others, |_| 1.0)?, n);
+    for _ in 0..LARGEST_PIVOTS * n {
+        let inverse = 1.0 / rows[width * leaving + entering];
+        scaled.iter_mut().zip(&rows[width * leaving..]).for_each(|(to, from)| *to = from * inverse);
+        for (i, row) in rows.chunks_exact_mut(width).enumerate() {
+            let factor = row[entering];
+            if i == leaving {
+                row.copy_from_slice(&scaled);
+                row[entering] = inverse;
+            } else if factor != 0.0 {
+                row.iter_mut().zip(&scaled).for_each(|(to, from)| *to -= factor * from);
+                row[entering] = -factor * inverse;
+            }
+        }
+        std::mem::swap(&mut basic[leaving], &mut others[entering]);
+        let value = |row: usize| rows[width * row + n + 1];
+        // Other variables may reach zero together with the artificial one.
+        if basic.iter().position(|variable| *variable == artificial).is_none_or(|row| value(row) <= DONE * largest) {
+            let mut solution = vec![0.0; n];
+            for (row, variable) in basic.iter().enumerate().filter(|(_, variable)| (n..artificial).contains(variable)) {
+                solution[variable - n] = value(row).max(0.0);
+            }
+            return Some(solution);
+        }
+        // The complement of the variable that left.
+        let left = others[entering];
+        let next = if left < n { left + n } else { left - n };
+        entering = others.iter().position(|variable| *variable == next)?;
+        let entry = |row: usize| rows[width * row + entering];
+        let scale = (0..n).fold(0.0_f64, |scale, row| scale.max(entry(row).abs()));
+        leaving = first_row(&rows, &basic, &others, |row| if entry(row) > ZERO * scale { entry(row) } else { 0.0 })?;
+    }
+    None
+}
+
+/// Of the rows whose entry is not zero the one whose end per entry is least; where some are equal, whose row of the inverse basis per entry is
+/// first in lexicographic order.
+#[inline(always)]
+fn first_row(rows: &[f64], basic: &[usize], others: &[usize], entry: impl Fn(usize) -> f64) -> Option<usize> {
+    let n = basic.len();
+    // The inverse basis stands in the columns of w, those of basic ones being unit vectors.
+    let inverse = |row: usize, w: usize| {
+        let column = others.iter().position(|variable| *variable == w);
+        column.map_or_else(|| f64::from(u8::from(basic[row] == w)), |column| rows[(n + 2) * row + column])
+    };
+    let end = |row: usize| rows[(n + 2) * row + n + 1];
+    let before = |a: usize, b: usize| {
+        let (by_a, by_b) = (entry(a), entry(b));
+        let order = (end(a) / by_a).total_cmp(&(end(b) / by_b));
+        let tied = || (0..n).map(|w| (inverse(a, w) / by_a).total_cmp(&(inverse(b, w) / by_b))).find(|order| order.is_ne());
+        if order.is_eq() { tied().is_some_and(|order| order.is_lt()) } else { order.is_lt() }
+    };
+    (0..n).filter(|row| entry(*row) != 0.0).reduce(|first, row| if before(row, first) { row } else { first })
+}
