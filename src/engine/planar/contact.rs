@@ -60,8 +60,12 @@ impl Law {
     }
 }
 
-/// States of two corners, the linear pieces of the law: 0 where a corner is open, 1 where it sticks, 2 where the floor pushes a sliding one
-/// towards +x, −2 where it pushes it towards −x.
+/// States of a corner, the linear pieces of the law. One that slides forward is pushed backward: −[`PUSHED_FORWARD`].
+pub(super) const OPEN: f64 = 0.0;
+pub(super) const STICKS: f64 = 1.0;
+pub(super) const PUSHED_FORWARD: f64 = 2.0;
+
+/// The states of two corners.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Touch(f64x2);
 
@@ -357,11 +361,15 @@ impl Corners {
         is_near.then(|| (self.arm.map(|part| part.to_array()[lane]), self.grip.friction.to_array()[lane]))
     }
 
-    /// Sets the state of the corner in a lane (see [`Touch`]).
-    pub(super) fn set_touch(&mut self, lane: usize, touch: f64) {
-        let mut both = self.touch.0.to_array();
-        both[lane] = touch;
-        self.touch = Touch(f64x2::new(both));
+    /// Sets the state of the corner in a lane and the floor's impulse on it (dyn·s, times the weight).
+    pub(super) fn set_solved(&mut self, lane: usize, state: f64, impulse: [f64; 2]) {
+        let with = |of: f64x2, value: f64| {
+            let mut both = of.to_array();
+            both[lane] = value;
+            f64x2::new(both)
+        };
+        self.touch = Touch(with(self.touch.0, state));
+        (0..2).for_each(|k| self.impulse[k] = with(self.impulse[k], impulse[k]));
     }
 
     /// Whether one of them slides.
@@ -392,6 +400,21 @@ impl Corners {
     /// Those whose states were not settled by Newton's method.
     pub(super) fn unsettled(&self) -> [bool; 2] {
         self.unsettled
+    }
+
+    /// Notes those as unsettled that the bodies' motion `mean` asks for other states than they are in; whether one is new among them. The impulses
+    /// of the others belong to it then.
+    pub(super) fn unsettle_changed(&mut self, mean: &Spatials, law: &Law) -> bool {
+        let (asked, impulse) = self.law(self.velocity_in(mean), law);
+        let [asked, touch] = [asked.0, self.touch.0].map(f64x2::to_array);
+        let [x, z] = impulse.map(f64x2::to_array);
+        let mut new = false;
+        for lane in (0..2).filter(|lane| !self.unsettled[*lane]).collect::<Vec<_>>() {
+            self.unsettled[lane] = asked[lane] != touch[lane];
+            new |= self.unsettled[lane];
+            self.set_solved(lane, touch[lane], [x[lane], z[lane]]);
+        }
+        new
     }
 
     /// Notes both as unsettled.

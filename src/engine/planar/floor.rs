@@ -185,9 +185,17 @@ impl Floor {
         self.corners[place].excess(lane, &mean_at(place, quads))
     }
 
-    /// Sets the state of a corner.
-    pub(super) fn set_touch(&mut self, place: usize, lane: usize, touch: f64) {
-        self.corners[place].set_touch(lane, touch);
+    /// Sets a corner's state and impulse, as [`Corners::set_solved`].
+    pub(super) fn set_solved(&mut self, place: usize, lane: usize, state: f64, impulse: [f64; 2]) {
+        self.corners[place].set_solved(lane, state, impulse);
+    }
+
+    /// As [`Corners::unsettle_changed`], for all listed corners.
+    pub(super) fn unsettle_changed(&mut self, quads: &[Quad], law: &Law) -> bool {
+        let all = self.all();
+        let mut new = false;
+        self.near(&all, quads, |_, corners, mean| new |= corners.unsettle_changed(mean, law));
+        new
     }
 
     /// Notes both corners of those places as unsettled of which `which` holds.

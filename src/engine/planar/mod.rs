@@ -1,4 +1,4 @@
-//! The same robot in the plane: springs and dampers implicit, contact as a convex problem, every step linear in the number of links.
+//! The same robot in the plane: springs and dampers implicit, contact by time stepping, every step linear in the number of links.
 //!
 //! # Scheme
 //!
@@ -26,11 +26,14 @@
 //! 0 ≤ v_n⁺ + gap/h  ⊥  λ_n ≥ 0,        |λ_t| ≤ μ λ_n
 //! ```
 //!
-//! so a corner never passes the floor: it stops on it, without bounce. Friction is the convex model of Anitescu: its minimum is unique, and
-//! sliding lifts a corner by μ·h·|v_t|, which vanishes with the step. [`FrictionModel::Coulomb`] takes that lift off again by a damped
-//! fixed-point iteration over such problems (De Saxcé). Newton's method over the corners' states (open, sticking, sliding) puts active
-//! corners into the recursion as terms of their bodies' inertia. In long chains the parts where corners change are solved by themselves in
-//! between.
+//! so a corner never passes the floor: it stops on it, without bounce. These are the time steps of Stewart and Trinkle and of Moreau and Jean,
+//! with the midpoint rule between them. Newton's method over the corners' states (open, sticking, sliding either way), from those of the step
+//! before, puts active corners into the recursion as terms of their bodies' inertia. Where it goes round in circles the step is solved by pivoting
+//! ([`pivoting`]), which always ends; a step that is not solved to rounding is an error. Where friction of Coulomb has several solutions (Painlevé),
+//! it is the one that Newton's method comes to from the states of the step before, otherwise that of the pivots.
+//!
+//! [`FrictionModel::Convex`] is the convex model of Anitescu instead: its minimum is unique, and sliding lifts a corner by μ·h·|v_t|, which
+//! vanishes with the step. In long chains the parts where corners change are solved by themselves in between.
 //!
 //! # References
 //!
@@ -72,16 +75,15 @@ const NUMERICAL_DAMPING: f64 = 50.0;
 /// The links' directions are computed anew every so many steps, for turning them on loses a last digit at times.
 const EXACT_EVERY: u64 = 256;
 
-/// How sliding corners are treated.
+/// The law of friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FrictionModel {
-    /// One convex problem a step. Sliding lifts a corner by μ·h·|v_t|, so that results over films of friction 2 to 4 are 10 % and more off
-    /// at steps of 10⁻⁴ s, and may need 10⁻⁶ s.
+    /// Coulomb's law, solved to rounding in every step.
     #[default]
-    Convex,
-    /// Coulomb's law, by repeating the step until nothing is lifted: several times the work. Heights and strides
-    /// over friction of 1 are right at steps of 10⁻⁴ s; over films of friction 4 they may need 10⁻⁵ s or less too.
     Coulomb,
+    /// Anitescu's convex relaxation. Sliding lifts a corner by μ·h·|v_t|, so that results over films of friction 2 to 4 are 10 % and more off
+    /// at steps of 10⁻⁴ s, and may need 10⁻⁶ s.
+    Convex,
 }
 
 /// The robot as a planar chain.
@@ -260,7 +262,7 @@ impl PlanarEngine {
         self.iterations
     }
 
-    /// Chooses how sliding corners are treated.
+    /// Chooses the law of friction.
     pub fn set_friction_model(&mut self, friction: FrictionModel) {
         self.law.friction = friction;
     }

@@ -37,6 +37,8 @@ const LARGEST_COULOMB: u32 = 4;
 const SETTLING: u32 = 2;
 /// Impulses off the law by less than this share of the robot's weight over the step and of the largest impulse are rounding.
 const MISMATCH: f64 = 1e-7;
+/// And what rounding leaves of velocities, as a share of the largest: 64 units in the last place.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// How a search along a Newton step ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,7 +159,7 @@ impl PlanarEngine {
     /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
     /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is lowered along the way there.
     #[inline(always)]
-    pub(super) fn newton_steps<S: Simd>(
+    fn newton_steps<S: Simd>(
         &mut self,
         simd: S,
         rungs: Range<usize>,
@@ -190,14 +192,15 @@ impl PlanarEngine {
         (largest.into(), false)
     }
 
-    /// Whether the impulses of the newest solution are the law's but for rounding.
+    /// Whether the impulses of the newest solution are the law's but for rounding. Contact is stiff: what rounding leaves of velocities is multiplied.
     fn is_rounding(&mut self, among: &Range<usize>, law: &Law) -> bool {
-        let (mut mismatch, mut largest) = (0.0_f64, self.mass * self.gravity * self.time_step);
+        let (mut mismatch, mut largest, mut speed) = (0.0_f64, self.mass * self.gravity * self.time_step, 0.0_f64);
         self.floor.near(among, &self.quads, |_, corners, mean| {
             mismatch = mismatch.max(corners.mismatch(mean, law));
             largest = largest.max(corners.largest_impulse());
+            speed = mean[1..].iter().flat_map(|part| part.abs().to_array()).fold(speed, f64::max);
         });
-        mismatch <= MISMATCH * largest
+        mismatch <= MISMATCH * largest + ROUNDING * speed * law.stiffness()
     }
 
     /// Makes the newest solution the iterate. The first states were a guess: any motion will do for one.

@@ -9,9 +9,9 @@
 //! 0 ≤ μ λ − β₊ − β₋                              ⊥  γ  ≥ 0
 //! ```
 //!
-//! The other corners stay in their states, which are checked afterwards. If that fails, more corners are taken, in the end all: W is positive
-//! definite then and the matrix copositive, so that Lemke's method with lexicographic pivots ends in a solution. There may be several: this
-//! is the one that its path from open corners comes to.
+//! The other corners stay in their states. Those for which that is wrong join, and if there is no solution more join, in the end all: then W is
+//! positive definite and the matrix copositive, so that Lemke's method with lexicographic pivots ends in a solution. There may be several: this is
+//! the one that its path from open corners comes to.
 //!
 //! D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth. Eng. 39 (1996); M. Anitescu and F. A. Potra, Nonlinear Dynamics 14 (1997); R. W. Cottle,
 //! J.-S. Pang and R. E. Stone, *The Linear Complementarity Problem* (1992), section 4.4.
@@ -19,7 +19,7 @@
 use fearless_simd::Simd;
 
 use super::PlanarEngine;
-use super::contact::{Corners, Law};
+use super::contact::{Corners, Law, OPEN, PUSHED_FORWARD, STICKS};
 
 /// Pivots per unknown after which rounding must have led in circles. Seen: up to one per unknown.
 const LARGEST_PIVOTS: usize = 20;
@@ -27,6 +27,9 @@ const LARGEST_PIVOTS: usize = 20;
 const ZERO: f64 = 1e-11;
 /// What is left of the artificial velocity that counts as none, as a share of what it begins with: corners side by side leave up to 1.5·10⁻¹⁰.
 const DONE: f64 = 1e-8;
+
+/// Velocities off the law by less than this share of the robot's speed, and of what gravity gives in a step, are rounding. Seen: up to 10⁻⁸.
+const OFF_THE_LAW: f64 = 1e-7;
 
 /// A corner of the problem.
 struct Corner {
@@ -36,26 +39,33 @@ struct Corner {
     friction: f64,
 }
 
+/// What a corner does in a solution: its state and the floor's impulse on it (dyn·s).
+struct Solved {
+    state: f64,
+    impulse: [f64; 2],
+}
+
 impl PlanarEngine {
     /// Solves the step's contact where Newton's method has left corners unsettled; whether it is solved. Out of line, for few steps come here.
     #[inline(never)]
     pub(super) fn solve_unsettled<S: Simd>(&mut self, simd: S, law: &Law) -> bool {
-        let more: [fn(&Corners) -> bool; 4] = [|_| false, Corners::slides, |corners| !corners.is_open(), |_| true];
-        let (rungs, all) = (0..self.rungs, self.floor.all());
-        let mut before = 0;
-        more.into_iter().any(|which| {
-            self.floor.unsettle(which);
+        // More corners where there is no solution for those at hand: that slide, that touch, all.
+        let mut more = [Corners::slides, |corners: &Corners| !corners.is_open(), |_: &Corners| true].into_iter();
+        loop {
             let corners = self.unsettled_corners();
-            // The same problem again has the same answer.
-            if std::mem::replace(&mut before, corners.len()) == corners.len() {
-                return false;
-            }
-            let pivoted = simd.vectorize(
+            let solution = simd.vectorize(
                 #[inline(always)]
                 || self.pivot(&corners, law),
             );
-            pivoted && self.newton_steps(simd, rungs.clone(), all.clone(), self.largest_steps, law).1
-        })
+            if solution.is_some_and(|solution| self.push(&corners, &solution, law)) {
+                if !self.floor.unsettle_changed(&self.quads, law) {
+                    return true;
+                }
+            } else {
+                let Some(which) = more.next() else { return false };
+                self.floor.unsettle(which);
+            }
+        }
     }
 
     fn unsettled_corners(&self) -> Vec<Corner> {
@@ -69,12 +79,50 @@ impl PlanarEngine {
         self.floor.listed().flat_map(of_place).flatten().collect()
     }
 
-    /// Sets the states of `corners` to those of a solution with all others in their states; whether there is one.
+    /// Moves the robot by the floor's impulses on `corners`, which are open to the recursion meanwhile: their states alone may make it nearly singular.
+    /// Whether that keeps the law.
+    fn push(&mut self, corners: &[Corner], solution: &[Solved], law: &Law) -> bool {
+        let (rungs, all) = (0..self.rungs, self.floor.all());
+        let momenta: Vec<_> = self.quads.iter().map(|quad| quad.momentum).collect();
+        for (corner, solved) in corners.iter().zip(solution) {
+            self.add_impulse(corner, solved.impulse);
+        }
+        self.solve_for_states(&rungs, &all, law);
+        for (quad, momentum) in self.quads.iter_mut().zip(momenta) {
+            quad.momentum = momentum;
+        }
+        let speeds = self.quads.iter().flat_map(|quad| quad.mean[1..].iter().flat_map(|part| part.to_array()));
+        let speed = speeds.fold(0.0_f64, |largest, part| largest.max(part.abs()));
+        let allowed = OFF_THE_LAW * (speed + self.gravity * self.time_step);
+        corners.iter().zip(solution).all(|(corner, solved)| {
+            let left = self.floor.excess(corner.place, corner.lane, &self.quads);
+            let [x, z] = [0, 1].map(|k| left[k] + solved.impulse[k] / law.stiffness());
+            self.floor.set_solved(corner.place, corner.lane, solved.state, solved.impulse);
+            let off = match solved.state {
+                OPEN => -z,
+                STICKS => z.abs().max(x.abs()),
+                // Slides against the impulse.
+                pushed => z.abs().max(x * pushed.signum()),
+            };
+            off <= allowed
+        })
+    }
+
+    /// Adds an impulse along x and z (dyn·s) on a corner to the momentum of its body.
+    fn add_impulse(&mut self, corner: &Corner, [x, z]: [f64; 2]) {
+        let (quad, lane) = (corner.place / 4, 2 * (corner.place / 2 % 2) + corner.lane);
+        let [ax, az] = corner.arm;
+        for (momentum, part) in self.quads[quad].momentum.iter_mut().zip([ax * z - az * x, x, z]) {
+            momentum.set_lane(lane, momentum.lane(lane) + part);
+        }
+    }
+
+    /// A solution for `corners` with all others in their states, and opens these corners; none if Lemke's method finds none.
     #[inline(always)]
-    fn pivot(&mut self, corners: &[Corner], law: &Law) -> bool {
+    fn pivot(&mut self, corners: &[Corner], law: &Law) -> Option<Vec<Solved>> {
         let (rungs, among) = (0..self.rungs, self.floor.all());
         let count = corners.len();
-        corners.iter().for_each(|corner| self.floor.set_touch(corner.place, corner.lane, 0.0));
+        corners.iter().for_each(|corner| self.floor.set_solved(corner.place, corner.lane, OPEN, [0.0; 2]));
         self.solve_for_states(&rungs, &among, law);
         let free: Vec<[f64; 2]> =
             corners.iter().map(|corner| self.floor.excess(corner.place, corner.lane, &self.quads)).collect();
@@ -82,13 +130,11 @@ impl PlanarEngine {
         let unit = self.mass / self.count as f64;
         let give = unit / law.stiffness();
         let mut w = vec![0.0; 4 * count * count];
-        for (j, Corner { place, lane, arm, .. }) in corners.iter().enumerate() {
-            let (quad, lane) = (place / 4, 2 * (place / 2 % 2) + lane);
-            for (direction, impulse) in [[-arm[1], 1.0, 0.0], [arm[0], 0.0, 1.0]].into_iter().enumerate() {
+        for (j, corner) in corners.iter().enumerate() {
+            for (direction, impulse) in [[unit, 0.0], [0.0, unit]].into_iter().enumerate() {
+                let quad = corner.place / 4;
                 let before = self.quads[quad].momentum;
-                for (momentum, part) in self.quads[quad].momentum.iter_mut().zip(impulse) {
-                    momentum.set_lane(lane, momentum.lane(lane) + unit * part);
-                }
+                self.add_impulse(corner, impulse);
                 self.solve_for_states(&rungs, &among, law);
                 self.quads[quad].momentum = before;
                 for (i, (corner, free)) in corners.iter().zip(&free).enumerate() {
@@ -123,17 +169,17 @@ impl PlanarEngine {
             }
             (right[normal + i], right[plus + i], right[minus + i]) = (free[i][1], free[i][0], -free[i][0]);
         }
-        let Some(solution) = lemke(&matrix, &right) else { return false };
-        for (i, corner) in corners.iter().enumerate() {
+        let solution = lemke(&matrix, &right)?;
+        let solved = |i: usize| {
             let state = match (solution[normal + i] > 0.0, solution[speed + i] > 0.0) {
-                (false, _) => 0.0,
-                (true, false) => 1.0,
-                (true, true) if solution[plus + i] >= solution[minus + i] => 2.0,
-                (true, true) => -2.0,
+                (false, _) => OPEN,
+                (true, false) => STICKS,
+                (true, true) if solution[plus + i] >= solution[minus + i] => PUSHED_FORWARD,
+                (true, true) => -PUSHED_FORWARD,
             };
-            self.floor.set_touch(corner.place, corner.lane, state);
-        }
-        true
+            Solved { state, impulse: [solution[plus + i] - solution[minus + i], solution[normal + i]].map(|part| unit * part) }
+        };
+        Some((0..count).map(solved).collect())
     }
 }
 
