@@ -163,6 +163,15 @@ fn a_time_step_that_no_time_can_be_counted_in_is_refused() {
     }
 }
 
+/// 4,700 factors of 1.87 on the markers were infinite together.
+#[test]
+fn more_than_a_hundred_effects_are_refused() {
+    let tables = |count: usize| CANTILEVER.to_owned() + &"[[effect]]\nid = \"sensor-scale\"\nscale = 1.001\n".repeat(count);
+    assert!(run(&tables(100), &[]).status.success());
+    let output = run(&tables(101), &[]);
+    assert!(output.status.code() == Some(2) && words(&output).contains("at most 100"), "{}", words(&output));
+}
+
 #[test]
 fn engines_refuse_a_step_of_zero_or_less_and_another_number_of_voltages() {
     let robot = experiment(CANTILEVER).robot;

@@ -19,6 +19,8 @@ use crate::words::{not_one_of, number};
 const DEFAULT_DAMPING_ETA: f64 = 0.045;
 /// Most steps of a run: up to here times are whole multiples of the step to a part in ten.
 const MAX_STEPS: f64 = 1e15;
+/// Most effects of one experiment; factors on one number stay finite together.
+const MAX_EFFECTS: usize = 100;
 /// Time steps (s) that times of up to `MAX_STEPS` of them are distinct and drawn for.
 const MIN_TIME_STEP: f64 = 1e-12;
 const MAX_TIME_STEP: f64 = 1e3;
@@ -146,6 +148,9 @@ fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segmen
 
 /// The `[[effect]]` tables with their values checked; those at their off values are left out.
 fn effects(config: &Config) -> Result<Vec<Applied>, Fault> {
+    if config.effect.len() > MAX_EFFECTS {
+        return Err(Fault::new("effect", format!("has {} tables; at most {MAX_EFFECTS} are possible", config.effect.len())));
+    }
     let read = |table: &EffectConfig| {
         let effect = effects::find(&table.id).ok_or_else(|| EffectError::Unknown(table.id.clone()))?;
         effect.with(table.parameters.iter().map(|(name, value)| (name.as_str(), *value)))

@@ -233,6 +233,6 @@ pub(super) const SIMULATION: Section = Section {
 pub(super) const EFFECT: Section = Section {
     name: "effect",
     heading: "[[effect]]",
-    about: "Zero or more extensions of the model, each with its parameters as further keys: `sfers effects` lists them with units, ranges and defaults.",
+    about: "Zero or more extensions of the model, each with its parameters as further keys: `sfers effects` lists them with units, ranges and defaults. At most 100.",
     keys: &[key("id", Name("effect", effects), Needed, "name of the effect")],
 };

@@ -48,6 +48,10 @@ impl Scale {
 /// Multiples of 1, 2 or 5 times a power of ten within a range, at most `count` of them, and the digits after the point that they need.
 pub(super) fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
     let rough = (high - low) / count as f64;
+    // Powers of ten below have no digits to be multiples of.
+    if rough < 1e-290 {
+        return (vec![low], 0);
+    }
     let power = rough.log10().floor();
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * 10f64.powf(power)).find(|step| *step >= rough * (1.0 - 1e-9));
     let step = step.unwrap_or(rough);
@@ -66,6 +70,7 @@ mod tests {
         assert_eq!(ticks(-0.4, 10.4, 6), (vec![0.0, 2.0, 4.0, 6.0, 8.0, 10.0], 0));
         let (values, digits) = ticks(0.0031, 0.0099, 8);
         assert_eq!(digits, 3);
+        assert_eq!(ticks(0.0, 5e-324, 5).0, [0.0]);
         assert!(values.iter().zip([0.004, 0.005, 0.006, 0.007, 0.008, 0.009]).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 }

@@ -22,6 +22,7 @@ use crate::{data, files, results, settings};
 const OPTIONAL: &[&str] = &[
     "energy",
     "step_choice",
+    "other_friction",
     "out",
     "fault",
     "link",
