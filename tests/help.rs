@@ -169,9 +169,9 @@ fn messages_speak_of_numbers_and_files_and_in_the_units_of_the_keys() {
             assert!(!text.contains(private), "{to}: {text}");
         }
     }
-    let planar = EXPERIMENT.replace("1e-5", "1e300\nengine = \"planar\"");
+    let planar = EXPERIMENT.replace("1e-5", "100\nengine = \"planar\"");
     let said = refused(&[("a.toml", &planar)], &["run", "a.toml"], 4);
-    assert!(said.contains("the time step 1e300 s is too long"), "{said}");
+    assert!(said.contains("the time step 100 s is too long"), "{said}");
     let said =
         refused(&[("a.toml", EXPERIMENT), ("s.json", "{\"schema\": \"x\"}")], &["run", "a.toml", "--load-state", "s.json"], 3);
     assert!(said.contains("s.json: not a saved state: this is the text \"x\", but a whole number"), "{said}");

@@ -158,7 +158,8 @@ fn a_number_of_steps_that_no_run_ends_is_refused() {
 #[test]
 fn a_time_step_that_no_time_can_be_counted_in_is_refused() {
     for step in ["1e100", "1001", "1e-13"] {
-        let output = run(CANTILEVER, &["--set", &format!("simulation.time_step_s={step}"), "--set", "simulation.duration_s=1e101"]);
+        let output =
+            run(CANTILEVER, &["--set", &format!("simulation.time_step_s={step}"), "--set", "simulation.duration_s=1e101"]);
         assert!(output.status.code() == Some(2) && words(&output).contains("simulation.time_step_s"), "{}", words(&output));
     }
 }
@@ -192,31 +193,6 @@ fn engines_refuse_a_step_of_zero_or_less_and_another_number_of_voltages() {
         }
         engine.prepare(&[1.0]).unwrap();
     }
-}
-
-/// High friction at long steps; before, nothing was said.
-#[test]
-fn steps_whose_coulomb_friction_was_not_solved_for_are_counted_and_many_give_no_measures() {
-    let walk = |friction: f64, low: f64, step: f64| {
-        let text = format!(
-            "[robot.friction]\nlow = {low}\nhigh = {friction}\n[drive]\nwaveform = \"gait\"\ngait = \"full-frictional-inchworm\"\n\
-             frequency_hz = 5\n[simulation]\nengine = \"planar\"\nfriction = \"coulomb\"\ntime_step_s = {step}\nduration_s = 0.5\n"
-        );
-        json(&run(&text, &["--json"]))
-    };
-    let solved = walk(4.0, 2.5, 1e-4);
-    assert_eq!(solved["warnings"].as_array().unwrap().len(), 0, "{solved}");
-    // 0.46 cm/s are left, four times the tolerance, and 13.3 cm/s.
-    let nearly = walk(5.0, 5.0, 5e-4);
-    let words = nearly["warnings"][0].as_str().unwrap();
-    assert!(
-        words.contains("steps, first at step 192, t = 0.096") && words.contains("Coulomb") && words.contains("tolerance"),
-        "{words}"
-    );
-    assert!(!nearly["measures"]["speed_mm_s"].is_null() || !nearly["measures"]["jump_height_mm"].is_null(), "{nearly}");
-    let far = walk(10.0, 5.0, 1e-3);
-    assert!(far["warnings"][0].as_str().unwrap().contains("Coulomb"), "{far}");
-    assert!(far["measures"]["jump_height_mm"].is_null(), "{far}");
 }
 
 /// The effects with memory, on a drive that never rests.

@@ -73,7 +73,6 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
     config.simulation = SimulationConfig {
         engine: Some("planar".into()),
         start: Some("settled".into()),
-        friction: (mount == Mount::Ground).then(|| "coulomb".into()),
         numerical_damping_per_s: (mount == Mount::Clamped).then_some(NUMERICAL_DAMPING),
         time_step_s: Some(StepConfig::Seconds(step)),
         steps: Some(steps),

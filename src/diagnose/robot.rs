@@ -9,7 +9,7 @@ use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Means, Table, Waveform};
 use crate::effects::{self, Applied, EFFECTS, Kind, Parameter, Path, View};
-use crate::engine::{Engine, EngineError, FrictionModel, PlanarEngine};
+use crate::engine::{Engine, EngineError, PlanarEngine};
 use crate::experiment::hermite;
 use crate::model::{Mount, PointMass, Robot};
 
@@ -453,7 +453,6 @@ fn track_from(
         _ => PlanarEngine::new(robot, h),
     };
     let mut engine = build(robot)?;
-    engine.set_friction_model(FrictionModel::Coulomb);
     let n = robot.actuators;
     let mut means = Means::new(drive, n, 0.0);
     let mut volts = vec![0.0; n];

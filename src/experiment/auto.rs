@@ -19,15 +19,13 @@ pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
 const COARSEST: f64 = 1e-3;
 const FINEST: f64 = 1e-7;
 /// Halvings from a step to the far finer one that must confirm it. Contact has plateaus, on which a halving changes little and eight times
-/// finer steps change all: a mover on films of friction 4 moves 2.8 mm at all steps from 2.5·10⁻⁴ to 6·10⁻⁵ s, and 6.2 mm at an eighth.
+/// finer steps change all: with the convex model a mover on films of friction 4 moves 2.8 mm at all steps from 2.5·10⁻⁴ to 6·10⁻⁵ s, and 6.2 mm at an eighth.
 const FAR: usize = 3;
-/// The two friction models may differ by this, whatever error is allowed: on that plateau they differ by 3 % and more (measured).
+/// Coulomb's law may differ from the convex model by this, whatever error is allowed: on that plateau they differ by 3 % and more (measured).
 const MODELS: f64 = 0.01;
-/// Steps of all trial runs together, those with Coulomb's law counted five times: this many, or those of so many runs by [`COARSEST`] if that is
-/// more. Some seconds for a robot of five actuators.
+/// Steps of all trial runs together: this many, or those of so many runs by [`COARSEST`] if that is more. Some seconds for a robot of five actuators.
 const BUDGET: u64 = 4_000_000;
 const BUDGET_RUNS: u64 = 200;
-const COULOMB_COST: u64 = 5;
 /// Records of a trial run.
 const RECORDS: f64 = 200.0;
 /// Values below this (mm, deg, Hz, –) are zero but for rounding.
@@ -41,10 +39,13 @@ pub struct StepTrial {
     /// Its friction model.
     pub friction: &'static str,
     /// The measure that is compared; absent for `trajectory`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
     /// Relative change from twice the step, if there is a run of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<f64>,
     /// Why it gave no result.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
 }
 
@@ -63,7 +64,8 @@ pub struct StepChoice {
     pub halvings: [f64; 2],
     /// From the step to an eighth of it.
     pub to_an_eighth: f64,
-    /// To the other friction model at the same step; absent for robots that do not touch the floor.
+    /// From the convex model of friction to Coulomb's law at the same step; absent with Coulomb's law and where nothing touches a floor.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub other_friction: Option<f64>,
     /// All trial runs, each over the whole duration.
     pub trials: Vec<StepTrial>,
@@ -93,8 +95,8 @@ enum End {
 }
 
 /// Chooses the step of a config with `time_step_s = "auto"` and resolves it with that step. The whole run is simulated with steps of 1 ms,
-/// 0.5 ms and so on, until at most `step_error` is changed by the last two halvings and by an eighth of the step, and, where a floor is touched,
-/// at most that and 1 % by the other friction model. Compared is the named measure, relative to itself, or the path of all nodes (root of the
+/// 0.5 ms and so on, until at most `step_error` is changed by the last two halvings and by an eighth of the step and, with the convex model of
+/// friction on a floor, at most that and 1 % by Coulomb's law. Compared is the named measure, relative to itself, or the path of all nodes (root of the
 /// mean square) relative to how far they go.
 pub(super) fn choose(
     config: &Config,
@@ -134,11 +136,7 @@ pub(super) fn choose(
         return Ok(checked);
     }
     let ours = checked.friction;
-    let other = match ours {
-        FrictionModel::Convex => FrictionModel::Coulomb,
-        FrictionModel::Coulomb => FrictionModel::Convex,
-    };
-    let other = (robot.mount == Mount::Ground).then_some(other);
+    let other = (robot.mount == Mount::Ground && ours == FrictionModel::Convex).then_some(FrictionModel::Coulomb);
     let mut trials = Trials {
         at: &|step, friction, record| at(step, friction, Some(record)),
         measure: s.step_measure.as_deref(),
@@ -219,7 +217,7 @@ impl Trials<'_> {
             return Ok(());
         }
         let step = self.step(level);
-        self.steps += (self.duration / step) as u64 * if key.0 { COULOMB_COST } else { 1 };
+        self.steps += (self.duration / step) as u64;
         if self.steps > self.budget() {
             return Err(End::Budget);
         }

@@ -345,7 +345,8 @@ impl Source {
             let mut table = text;
             for setting in &self.settings {
                 let assigned = assign(&mut table, &setting.key, setting.toml());
-                if let Err(error) = assigned.and_then(|()| table.clone().try_into::<Config>().map_err(|e| words::toml_error(&e))) {
+                if let Err(error) = assigned.and_then(|()| table.clone().try_into::<Config>().map_err(|e| words::toml_error(&e)))
+                {
                     return syntax(setting.place.clone(), error);
                 }
             }

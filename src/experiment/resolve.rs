@@ -87,7 +87,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segmen
     if start == Start::Settled && engine == EngineKind::Bullet {
         return Err(Fault::new("simulation.start", "settled needs engine = \"planar\"; the reference starts flat").into());
     }
-    let models = [("convex", FrictionModel::Convex), ("coulomb", FrictionModel::Coulomb)];
+    let models = [("coulomb", FrictionModel::Coulomb), ("convex", FrictionModel::Convex)];
     let friction = choose("simulation.friction", config.simulation.friction.as_deref(), FrictionModel::default(), &models)?;
     if config.simulation.friction.is_some() && engine == EngineKind::Bullet {
         return Err(Fault::new("simulation.friction", "belongs to engine = \"planar\"; Bullet has a model of its own").into());

@@ -216,7 +216,7 @@ pub(super) const SIMULATION: Section = Section {
     keys: &[
         key("engine", Word(&["bullet", "planar"]), Is("\"bullet\""), "bullet: bit for bit the reference; planar: the fast one. In sweeps the default is planar"),
         key("start", Word(&["flat", "settled"]), Is("\"flat\""), "flat and at rest; or in equilibrium with gravity, floor and first voltages (planar engine)"),
-        key("friction", Word(&["convex", "coulomb"]), Is("\"convex\""), "model of sliding: convex lifts sliding contacts by friction times speed times time step; coulomb does not and is slower").with("engine = \"planar\""),
+        key("friction", Word(&["coulomb", "convex"]), Is("\"coulomb\""), "law of friction: coulomb is solved in every step; convex, a relaxation, lifts sliding contacts by friction times speed times time step").with("engine = \"planar\""),
         key("numerical_damping_per_s", Number(NotNegative), Else("50"), "weight of a step's end over that of its start, per time step: damps what alternates from step to step; less is more exact where nothing touches").with("engine = \"planar\""),
         key("time_step_s", Other("a number from 1e-12 to 1000, or \"auto\" on the planar engine"), Needed, "time step; \"auto\" takes the coarsest that halving changes by less than step_error"),
         key("step_error", Number(Inside(0.0, 1.0)), Is("0.001"), "relative change of the result that halving the step may make").with("time_step_s = \"auto\""),

@@ -22,7 +22,6 @@ use crate::{data, files, results, settings};
 const OPTIONAL: &[&str] = &[
     "energy",
     "step_choice",
-    "other_friction",
     "out",
     "fault",
     "link",

@@ -138,6 +138,8 @@ pub struct PlanarEngine {
     turns: [f64; 2],
     /// Newton iterations so far, of all steps.
     iterations: u64,
+    /// Steps solved by pivoting.
+    pivoted: u64,
     /// Energy that the weight of the step's end has taken so far (erg).
     numerical_loss: f64,
 }
@@ -253,6 +255,7 @@ impl PlanarEngine {
             finite: false,
             turns: [0.0; 2],
             iterations: 0,
+            pivoted: 0,
             numerical_loss: 0.0,
         })
     }
@@ -260,6 +263,11 @@ impl PlanarEngine {
     /// Contact problems' Newton iterations over all steps so far; 0 for steps without contact.
     pub fn iterations(&self) -> u64 {
         self.iterations
+    }
+
+    /// Steps so far whose contact was solved by pivoting, for Newton's method went round in circles.
+    pub fn pivoted(&self) -> u64 {
+        self.pivoted
     }
 
     /// Chooses the law of friction.

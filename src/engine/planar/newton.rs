@@ -299,7 +299,7 @@ mod tests {
     use crate::experiment::{self, Experiment, Source};
 
     /// A robot of 30 actuators, which is solved in parts: in every group of five the inner three go on and off.
-    fn long() -> (Experiment, PlanarEngine) {
+    fn long(friction: FrictionModel) -> (Experiment, PlanarEngine) {
         let on = "0, 520, -1500, 520, 0, ".repeat(6);
         let off = "0, ".repeat(30);
         let text = format!(
@@ -308,7 +308,8 @@ mod tests {
              [simulation]\nengine = \"planar\"\ntime_step_s = 1e-4\nsteps = 1000\nrecord_every_steps = 1000\n"
         );
         let experiment = experiment::experiment(&Source::from_text("long", &text)).unwrap();
-        let engine = PlanarEngine::new(&experiment.robot, 1e-4).unwrap();
+        let mut engine = PlanarEngine::new(&experiment.robot, 1e-4).unwrap();
+        engine.set_friction_model(friction);
         assert!(engine.rungs > LONGEST_WHOLE && engine.outside.len() > 2);
         (experiment, engine)
     }
@@ -327,7 +328,7 @@ mod tests {
 
     /// The robot after a step in which it landed and corners changed.
     fn landing() -> PlanarEngine {
-        let (experiment, mut engine) = long();
+        let (experiment, mut engine) = long(FrictionModel::Convex);
         for _ in 0..900 {
             let before = engine.iterations();
             step(&experiment, &mut engine);
@@ -339,9 +340,8 @@ mod tests {
     }
 
     fn solve_part(engine: &mut PlanarEngine, rungs: Range<usize>) -> Articulated {
-        let law = engine.law;
-        let among = engine.floor.among(&rungs);
-        solve(&mut engine.quads, rungs, engine.hold, engine.floor.inwards(&among), &law, &mut engine.outside)
+        let (law, among) = (engine.law, engine.floor.among(&rungs));
+        engine.solve_for_states(&rungs, &among, &law)
     }
 
     fn means(engine: &PlanarEngine) -> Vec<[Lanes; 3]> {
@@ -399,8 +399,8 @@ mod tests {
 
     #[test]
     fn parts_lead_to_what_the_whole_chain_does() {
-        let (experiment, mut engine) = long();
-        let (_, mut whole) = long();
+        let (experiment, mut engine) = long(FrictionModel::Convex);
+        let (_, mut whole) = long(FrictionModel::Convex);
         whole.outside.clear();
         let mut worst = 0.0_f64;
         for _ in 0..900 {
@@ -421,7 +421,7 @@ mod tests {
     /// Landing takes more than two steps of Newton's method.
     #[test]
     fn too_many_steps_are_a_failure_with_step_and_time() {
-        let (experiment, mut engine) = long();
+        let (experiment, mut engine) = long(FrictionModel::Convex);
         engine.outside.clear();
         engine.largest_steps = 2;
         let error = (0..900).find_map(|_| try_step(&experiment, &mut engine).err()).expect("no failure").to_string();
@@ -432,7 +432,7 @@ mod tests {
     #[test]
     fn parts_have_the_same_bits_in_all_registers() {
         let after = |level: Level| {
-            let (experiment, mut engine) = long();
+            let (experiment, mut engine) = long(FrictionModel::Convex);
             engine.level = level;
             (0..900).for_each(|_| step(&experiment, &mut engine));
             engine.save().unwrap().into_iter().map(f64::to_bits).collect::<Vec<_>>()
