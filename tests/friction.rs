@@ -62,7 +62,7 @@ fn coulombs_law_holds_in_every_step() {
             (0..actuators).map(|i| if (i + case as usize) % 3 == 1 { "-1500" } else { "520" }.into()).collect();
         let experiment = experiment::experiment(&Source::from_text(
             "rough",
-            &format!(
+            format!(
                 "[robot]\nactuators = {actuators}\nmotors_per_actuator = {motors}\nfriction = {{ low = {low}, high = {high}, film_fraction = 0.25 }}\n\
                  [drive]\nwaveform = \"sequence\"\nfrequency_hz = {}\nphases = [{{ until = 0.5, voltages_v = [{}] }}, \
                  {{ until = 1.0, voltages_v = [{}] }}]\n[simulation]\nengine = \"planar\"\ntime_step_s = 1e-4\nduration_s = 0.3\n",

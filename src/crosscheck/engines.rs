@@ -176,7 +176,9 @@ pub fn compare_engines(experiment: &Experiment, steps: [f64; 2]) -> Result<Engin
             run.trouble(&experiment).is_empty().then(|| named(&run, rests))
         };
         let h = experiment.time_step;
-        let other_step = if warnings.is_empty() { other(2.0 * h).or_else(|| other(0.5 * h)) } else { None };
+        // Records as far apart as the step allow no longer one.
+        let longer = (with(engine, 2.0 * h).time_step > 1.5 * h).then_some(2.0 * h);
+        let other_step = if warnings.is_empty() { longer.and_then(other).or_else(|| other(0.5 * h)) } else { None };
         Ok(Side { run, wall, warnings, other_step })
     };
     let (bullet, planar) = (on(EngineKind::Bullet, steps[0])?, on(EngineKind::Planar, steps[1])?);

@@ -417,9 +417,10 @@ impl Corners {
         new
     }
 
-    /// Notes both as unsettled.
-    pub(super) fn unsettle(&mut self) {
-        self.unsettled = [true; 2];
+    /// Notes those as unsettled in whose state `which` holds.
+    pub(super) fn unsettle(&mut self, which: impl Fn(f64) -> bool) {
+        let states = self.touch.0.to_array();
+        (0..2).for_each(|lane| self.unsettled[lane] |= which(states[lane]));
     }
 
     /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).

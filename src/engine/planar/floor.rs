@@ -198,14 +198,9 @@ impl Floor {
         new
     }
 
-    /// Notes both corners of those places as unsettled of which `which` holds.
-    pub(super) fn unsettle(&mut self, which: impl Fn(&Corners) -> bool) {
-        for place in &self.near {
-            let corners = &mut self.corners[*place];
-            if which(corners) {
-                corners.unsettle();
-            }
-        }
+    /// Notes listed corners as unsettled in whose state `which` holds.
+    pub(super) fn unsettle(&mut self, which: impl Fn(f64) -> bool) {
+        self.near.iter().for_each(|place| self.corners[*place].unsettle(&which));
     }
 
     /// Listed corners, for the walk to the root.

@@ -51,7 +51,8 @@ impl PlanarEngine {
     pub(super) fn solve_unsettled<S: Simd>(&mut self, simd: S, law: &Law) -> bool {
         self.pivoted += 1;
         // More corners where there is no solution for those at hand: that slide, that touch, all.
-        let mut more = [Corners::slides, |corners: &Corners| !corners.is_open(), |_: &Corners| true].into_iter();
+        let more: [fn(f64) -> bool; 3] = [|state| state.abs() == PUSHED_FORWARD, |state| state != OPEN, |_| true];
+        let mut more = more.into_iter();
         loop {
             let corners = self.unsettled_corners();
             let solution = simd.vectorize(
