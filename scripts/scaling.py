@@ -43,6 +43,7 @@ film = "none"
 {drive(count)}
 [simulation]
 engine = "planar"
+friction = "convex"
 time_step_s = 1e-4
 steps = {steps}
 record_every_steps = {steps}

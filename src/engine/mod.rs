@@ -30,7 +30,9 @@ pub enum EngineError {
     #[error(transparent)]
     Bullet(#[from] BulletError),
     /// The contact problem of a step was not solved.
-    #[error("contact was not solved in {iterations} iterations at step {step}, t = {time} s; try a smaller time step")]
+    #[error(
+        "contact was not solved in {iterations} iterations at step {step}, t = {time} s; try a smaller time step, or simulation.friction = \"convex\" for long chains"
+    )]
     NotConverged {
         /// Iterations done.
         iterations: u32,

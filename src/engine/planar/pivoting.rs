@@ -22,7 +22,9 @@ use super::PlanarEngine;
 use super::contact::{Corners, Law, OPEN, PUSHED_FORWARD, STICKS};
 
 /// Pivots per unknown after which rounding must have led in circles. Seen: up to one per unknown.
-const LARGEST_PIVOTS: usize = 20;
+const LARGEST_PIVOTS: usize = 3;
+/// Most corners of a problem, whose work grows with the third power of their number: some seconds for these. Seen: 32 for the paper's robots.
+const LARGEST_PROBLEM: usize = 400;
 /// Entries of a column below this share of its largest are zero.
 const ZERO: f64 = 1e-11;
 /// What is left of the artificial velocity that counts as none, as a share of what it begins with: corners side by side leave up to 1.5·10⁻¹⁰.
@@ -46,7 +48,8 @@ struct Solved {
 }
 
 impl PlanarEngine {
-    /// Solves the step's contact where Newton's method has left corners unsettled; whether it is solved. Out of line, for few steps come here.
+    /// Solves the step's contact where Newton's method has left corners unsettled; whether it is solved. Not in long chains where more than
+    /// [`LARGEST_PROBLEM`] are. Out of line, for few steps come here.
     #[inline(never)]
     pub(super) fn solve_unsettled<S: Simd>(&mut self, simd: S, law: &Law) -> bool {
         self.pivoted += 1;
@@ -55,6 +58,9 @@ impl PlanarEngine {
         let mut more = more.into_iter();
         loop {
             let corners = self.unsettled_corners();
+            if corners.len() > LARGEST_PROBLEM {
+                return false;
+            }
             let solution = simd.vectorize(
                 #[inline(always)]
                 || self.pivot(&corners, law),
