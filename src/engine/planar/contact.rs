@@ -409,7 +409,10 @@ impl Corners {
         let [asked, touch] = [asked.0, self.touch.0].map(f64x2::to_array);
         let [x, z] = impulse.map(f64x2::to_array);
         let mut new = false;
-        for lane in (0..2).filter(|lane| !self.unsettled[*lane]).collect::<Vec<_>>() {
+        for lane in 0..2 {
+            if self.unsettled[lane] {
+                continue;
+            }
             self.unsettled[lane] = asked[lane] != touch[lane];
             new |= self.unsettled[lane];
             self.set_solved(lane, touch[lane], [x[lane], z[lane]]);

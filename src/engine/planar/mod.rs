@@ -60,6 +60,7 @@ use self::contact::Law;
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
+use self::pivoting::Workspace;
 use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -140,6 +141,7 @@ pub struct PlanarEngine {
     iterations: u64,
     /// Steps solved by pivoting.
     pivoted: u64,
+    pivoting: Workspace,
     /// Energy that the weight of the step's end has taken so far (erg).
     numerical_loss: f64,
 }
@@ -256,6 +258,7 @@ impl PlanarEngine {
             turns: [0.0; 2],
             iterations: 0,
             pivoted: 0,
+            pivoting: Workspace::default(),
             numerical_loss: 0.0,
         })
     }

@@ -19,7 +19,8 @@
 use fearless_simd::Simd;
 
 use super::PlanarEngine;
-use super::contact::{Corners, Law, OPEN, PUSHED_FORWARD, STICKS};
+use super::contact::{Law, OPEN, PUSHED_FORWARD, STICKS};
+use super::lanes::Lanes;
 
 /// Pivots per unknown after which rounding must have led in circles. Seen: up to one per unknown.
 const LARGEST_PIVOTS: usize = 3;
@@ -41,6 +42,19 @@ struct Corner {
     friction: f64,
 }
 
+/// Room for the problems, kept from step to step.
+#[derive(Default)]
+pub(super) struct Workspace {
+    corners: Vec<Corner>,
+    solution: Vec<Solved>,
+    momenta: Vec<[Lanes; 3]>,
+    free: Vec<[f64; 2]>,
+    w: Vec<f64>,
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    lemke: Lemke,
+}
+
 /// What a corner does in a solution: its state and the floor's impulse on it (dyn·s).
 struct Solved {
     state: f64,
@@ -56,53 +70,57 @@ impl PlanarEngine {
         // More corners where there is no solution for those at hand: that slide, that touch, all.
         let more: [fn(f64) -> bool; 3] = [|state| state.abs() == PUSHED_FORWARD, |state| state != OPEN, |_| true];
         let mut more = more.into_iter();
-        loop {
-            let corners = self.unsettled_corners();
-            if corners.len() > LARGEST_PROBLEM {
-                return false;
+        let mut room = std::mem::take(&mut self.pivoting);
+        let solved = loop {
+            self.list_unsettled(&mut room.corners);
+            if room.corners.len() > LARGEST_PROBLEM {
+                break false;
             }
-            let solution = simd.vectorize(
+            let pivoted = simd.vectorize(
                 #[inline(always)]
-                || self.pivot(&corners, law),
+                || self.pivot(&mut room, law),
             );
-            if solution.is_some_and(|solution| self.push(&corners, &solution, law)) {
+            if pivoted && self.push(&mut room, law) {
                 if !self.floor.unsettle_changed(&self.quads, law) {
-                    return true;
+                    break true;
                 }
             } else {
-                let Some(which) = more.next() else { return false };
+                let Some(which) = more.next() else { break false };
                 self.floor.unsettle(which);
             }
-        }
+        };
+        self.pivoting = room;
+        solved
     }
 
-    fn unsettled_corners(&self) -> Vec<Corner> {
-        let of_place = |(place, corners): (usize, &'_ Corners)| {
+    fn list_unsettled(&self, into: &mut Vec<Corner>) {
+        into.clear();
+        for (place, corners) in self.floor.listed() {
             let unsettled = corners.unsettled();
-            [0, 1].map(|lane| {
-                let near = corners.near(lane).filter(|_| unsettled[lane]);
-                near.map(|(arm, friction)| Corner { place, lane, arm, friction })
-            })
-        };
-        self.floor.listed().flat_map(of_place).flatten().collect()
+            for lane in (0..2).filter(|lane| unsettled[*lane]) {
+                into.extend(corners.near(lane).map(|(arm, friction)| Corner { place, lane, arm, friction }));
+            }
+        }
     }
 
     /// Moves the robot by the floor's impulses on `corners`, which are open to the recursion meanwhile: their states alone may make it nearly singular.
     /// Whether that keeps the law.
-    fn push(&mut self, corners: &[Corner], solution: &[Solved], law: &Law) -> bool {
+    fn push(&mut self, room: &mut Workspace, law: &Law) -> bool {
         let (rungs, all) = (0..self.rungs, self.floor.all());
-        let momenta: Vec<_> = self.quads.iter().map(|quad| quad.momentum).collect();
-        for (corner, solved) in corners.iter().zip(solution) {
+        let Workspace { corners, solution, momenta, .. } = room;
+        momenta.clear();
+        momenta.extend(self.quads.iter().map(|quad| quad.momentum));
+        for (corner, solved) in corners.iter().zip(&*solution) {
             self.add_impulse(corner, solved.impulse);
         }
         self.solve_for_states(&rungs, &all, law);
         for (quad, momentum) in self.quads.iter_mut().zip(momenta) {
-            quad.momentum = momentum;
+            quad.momentum = *momentum;
         }
         let speeds = self.quads.iter().flat_map(|quad| quad.mean[1..].iter().flat_map(|part| part.to_array()));
         let speed = speeds.fold(0.0_f64, |largest, part| largest.max(part.abs()));
         let allowed = OFF_THE_LAW * (speed + self.gravity * self.time_step);
-        corners.iter().zip(solution).all(|(corner, solved)| {
+        corners.iter().zip(&*solution).all(|(corner, solved)| {
             let left = self.floor.excess(corner.place, corner.lane, &self.quads);
             let [x, z] = [0, 1].map(|k| left[k] + solved.impulse[k] / law.stiffness());
             self.floor.set_solved(corner.place, corner.lane, solved.state, solved.impulse);
@@ -125,19 +143,20 @@ impl PlanarEngine {
         }
     }
 
-    /// A solution for `corners` with all others in their states, and opens these corners; none if Lemke's method finds none.
+    /// Finds a solution for the workspace's corners with all others in their states, and opens these corners; whether Lemke's method finds one.
     #[inline(always)]
-    fn pivot(&mut self, corners: &[Corner], law: &Law) -> Option<Vec<Solved>> {
+    fn pivot(&mut self, room: &mut Workspace, law: &Law) -> bool {
         let (rungs, among) = (0..self.rungs, self.floor.all());
+        let Workspace { corners, solution: into, free, w, matrix, right, lemke, .. } = room;
         let count = corners.len();
         corners.iter().for_each(|corner| self.floor.set_solved(corner.place, corner.lane, OPEN, [0.0; 2]));
         self.solve_for_states(&rungs, &among, law);
-        let free: Vec<[f64; 2]> =
-            corners.iter().map(|corner| self.floor.excess(corner.place, corner.lane, &self.quads)).collect();
+        free.clear();
+        free.extend(corners.iter().map(|corner| self.floor.excess(corner.place, corner.lane, &self.quads)));
         // Impulses in units of a body's mass: the matrix is of order one then. By rows, of x and z of each corner.
         let unit = self.mass / self.count as f64;
         let give = unit / law.stiffness();
-        let mut w = vec![0.0; 4 * count * count];
+        cleared(w, 4 * count * count);
         for (j, corner) in corners.iter().enumerate() {
             for (direction, impulse) in [[unit, 0.0], [0.0, unit]].into_iter().enumerate() {
                 let quad = corner.place / 4;
@@ -145,7 +164,7 @@ impl PlanarEngine {
                 self.add_impulse(corner, impulse);
                 self.solve_for_states(&rungs, &among, law);
                 self.quads[quad].momentum = before;
-                for (i, (corner, free)) in corners.iter().zip(&free).enumerate() {
+                for (i, (corner, free)) in corners.iter().zip(&*free).enumerate() {
                     let with = self.floor.excess(corner.place, corner.lane, &self.quads);
                     (0..2).for_each(|k| w[2 * count * (2 * i + k) + 2 * j + direction] = with[k] - free[k]);
                 }
@@ -155,8 +174,8 @@ impl PlanarEngine {
         // λ of all corners, then β₊, β₋ and γ.
         let [normal, plus, minus, speed] = [0, 1, 2, 3].map(|block| block * count);
         let n = 4 * count;
-        let mut matrix = vec![0.0; n * n];
-        let mut right = vec![0.0; n];
+        cleared(matrix, n * n);
+        cleared(right, n);
         for i in 0..count {
             for j in 0..count {
                 let [[tt, tn], [nt, nn]] = [0, 1].map(|a| [0, 1].map(|b| w[2 * count * (2 * i + a) + 2 * j + b]));
@@ -177,7 +196,10 @@ impl PlanarEngine {
             }
             (right[normal + i], right[plus + i], right[minus + i]) = (free[i][1], free[i][0], -free[i][0]);
         }
-        let solution = lemke(&matrix, &right)?;
+        if !lemke.solve(matrix, right) {
+            return false;
+        }
+        let solution = &lemke.solution;
         let solved = |i: usize| {
             let state = match (solution[normal + i] > 0.0, solution[speed + i] > 0.0) {
                 (false, _) => OPEN,
@@ -187,60 +209,89 @@ impl PlanarEngine {
             };
             Solved { state, impulse: [solution[plus + i] - solution[minus + i], solution[normal + i]].map(|part| unit * part) }
         };
-        Some((0..count).map(solved).collect())
+        into.clear();
+        into.extend((0..count).map(solved));
+        true
     }
 }
 
-/// A solution z of 0 ≤ w = M z + q ⊥ z ≥ 0 by Lemke's method, with M by rows; none if its path ends on a ray.
-#[inline(always)]
-fn lemke(matrix: &[f64], right: &[f64]) -> Option<Vec<f64>> {
-    let n = right.len();
-    let largest = -right.iter().copied().fold(0.0, f64::min);
-    if largest == 0.0 {
-        return Some(vec![0.0; n]);
+/// Sets a vector to so many zeros.
+fn cleared<T: Clone + Default>(vector: &mut Vec<T>, length: usize) {
+    vector.clear();
+    vector.resize(length, T::default());
+}
+
+/// Lemke's method and its room.
+#[derive(Default)]
+struct Lemke {
+    rows: Vec<f64>,
+    scaled: Vec<f64>,
+    basic: Vec<usize>,
+    others: Vec<usize>,
+    solution: Vec<f64>,
+}
+
+impl Lemke {
+    /// Finds a solution z of 0 ≤ w = M z + q ⊥ z ≥ 0, with M by rows; whether there is one, or the path ends on a ray.
+    #[inline(always)]
+    fn solve(&mut self, matrix: &[f64], right: &[f64]) -> bool {
+        self.find(matrix, right).is_some()
     }
-    // Variables w (0 to n), z (n to 2n) and z₀ (2n) with w = M z + z₀ + q. Each row: a basic one is the row's end less the row times the others.
-    let (artificial, width) = (2 * n, n + 2);
-    let mut rows = vec![0.0; n * width];
-    for (i, row) in rows.chunks_exact_mut(width).enumerate() {
-        row[..n].iter_mut().zip(&matrix[n * i..]).for_each(|(to, from)| *to = -from);
-        (row[n], row[n + 1]) = (-1.0, right[i]);
-    }
-    let (mut basic, mut others): (Vec<usize>, Vec<usize>) = ((0..n).collect(), (n..=2 * n).collect());
-    let mut scaled = vec![0.0; width];
-    let (mut leaving, mut entering) = (first_row(&rows, &basic, &others, |_| 1.0)?, n);
-    for _ in 0..LARGEST_PIVOTS * n {
-        let inverse = 1.0 / rows[width * leaving + entering];
-        scaled.iter_mut().zip(&rows[width * leaving..]).for_each(|(to, from)| *to = from * inverse);
+
+    #[inline(always)]
+    fn find(&mut self, matrix: &[f64], right: &[f64]) -> Option<()> {
+        let Self { rows, scaled, basic, others, solution } = self;
+        let n = right.len();
+        let largest = -right.iter().copied().fold(0.0, f64::min);
+        cleared(solution, n);
+        if largest == 0.0 {
+            return Some(());
+        }
+        // Variables w (0 to n), z (n to 2n) and z₀ (2n) with w = M z + z₀ + q. Each row: a basic one is the row's end less the row times the others.
+        let (artificial, width) = (2 * n, n + 2);
+        cleared(rows, n * width);
         for (i, row) in rows.chunks_exact_mut(width).enumerate() {
-            let factor = row[entering];
-            if i == leaving {
-                row.copy_from_slice(&scaled);
-                row[entering] = inverse;
-            } else if factor != 0.0 {
-                row.iter_mut().zip(&scaled).for_each(|(to, from)| *to -= factor * from);
-                row[entering] = -factor * inverse;
-            }
+            row[..n].iter_mut().zip(&matrix[n * i..]).for_each(|(to, from)| *to = -from);
+            (row[n], row[n + 1]) = (-1.0, right[i]);
         }
-        std::mem::swap(&mut basic[leaving], &mut others[entering]);
-        let value = |row: usize| rows[width * row + n + 1];
-        // Other variables may reach zero together with the artificial one.
-        if basic.iter().position(|variable| *variable == artificial).is_none_or(|row| value(row) <= DONE * largest) {
-            let mut solution = vec![0.0; n];
-            for (row, variable) in basic.iter().enumerate().filter(|(_, variable)| (n..artificial).contains(variable)) {
-                solution[variable - n] = value(row).max(0.0);
+        basic.clear();
+        basic.extend(0..n);
+        others.clear();
+        others.extend(n..=2 * n);
+        cleared(scaled, width);
+        let (mut leaving, mut entering) = (first_row(rows, basic, others, |_| 1.0)?, n);
+        for _ in 0..LARGEST_PIVOTS * n {
+            let inverse = 1.0 / rows[width * leaving + entering];
+            scaled.iter_mut().zip(&rows[width * leaving..]).for_each(|(to, from)| *to = from * inverse);
+            for (i, row) in rows.chunks_exact_mut(width).enumerate() {
+                let factor = row[entering];
+                if i == leaving {
+                    row.copy_from_slice(scaled);
+                    row[entering] = inverse;
+                } else if factor != 0.0 {
+                    row.iter_mut().zip(&*scaled).for_each(|(to, from)| *to -= factor * from);
+                    row[entering] = -factor * inverse;
+                }
             }
-            return Some(solution);
+            std::mem::swap(&mut basic[leaving], &mut others[entering]);
+            let value = |row: usize| rows[width * row + n + 1];
+            // Other variables may reach zero together with the artificial one.
+            if basic.iter().position(|variable| *variable == artificial).is_none_or(|row| value(row) <= DONE * largest) {
+                for (row, variable) in basic.iter().enumerate().filter(|(_, variable)| (n..artificial).contains(variable)) {
+                    solution[variable - n] = value(row).max(0.0);
+                }
+                return Some(());
+            }
+            // The complement of the variable that left.
+            let left = others[entering];
+            let next = if left < n { left + n } else { left - n };
+            entering = others.iter().position(|variable| *variable == next)?;
+            let entry = |row: usize| rows[width * row + entering];
+            let scale = (0..n).fold(0.0_f64, |scale, row| scale.max(entry(row).abs()));
+            leaving = first_row(rows, basic, others, |row| if entry(row) > ZERO * scale { entry(row) } else { 0.0 })?;
         }
-        // The complement of the variable that left.
-        let left = others[entering];
-        let next = if left < n { left + n } else { left - n };
-        entering = others.iter().position(|variable| *variable == next)?;
-        let entry = |row: usize| rows[width * row + entering];
-        let scale = (0..n).fold(0.0_f64, |scale, row| scale.max(entry(row).abs()));
-        leaving = first_row(&rows, &basic, &others, |row| if entry(row) > ZERO * scale { entry(row) } else { 0.0 })?;
+        None
     }
-    None
 }
 
 /// Of the rows whose entry is not zero the one whose end per entry is least; where some are equal, whose row of the inverse basis per entry is
@@ -266,6 +317,11 @@ fn first_row(rows: &[f64], basic: &[usize], others: &[usize], entry: impl Fn(usi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn lemke(matrix: &[f64], right: &[f64]) -> Option<Vec<f64>> {
+        let mut method = Lemke::default();
+        method.solve(matrix, right).then_some(method.solution)
+    }
 
     /// Contacts of a body that bends with a floor, some of them side by side: as in [`PlanarEngine::pivot`].
     fn contacts(seed: u64, count: usize, close: f64) -> (Vec<f64>, Vec<f64>) {
