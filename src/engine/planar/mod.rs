@@ -29,7 +29,7 @@
 //! so a corner never passes the floor: it stops on it, without bounce. These are the time steps of Stewart and Trinkle and of Moreau and Jean,
 //! with the midpoint rule between them. Newton's method over the corners' states (open, sticking, sliding either way), from those of the step
 //! before, puts active corners into the recursion as terms of their bodies' inertia. Where it goes round in circles the step is solved by pivoting
-//! ([`pivoting`]), which always ends; a step that is not solved to rounding is an error. Where friction of Coulomb has several solutions (Painlevé),
+//! ([`pivoting`]), for up to some hundred corners; a step that is not solved to rounding is an error. Where friction of Coulomb has several solutions (Painlevé),
 //! it is the one that Newton's method comes to from the states of the step before, otherwise that of the pivots.
 //!
 //! [`FrictionModel::Convex`] is the convex model of Anitescu instead: its minimum is unique, and sliding lifts a corner by μ·h·|v_t|, which

@@ -135,15 +135,15 @@ impl PlanarEngine {
         law: &Law,
         mut each: impl FnMut(usize, bool),
     ) -> Articulated {
-        let felt = self.solve_for_states(rungs, among, law);
+        let felt = self.solve_with_modes(rungs, among, law);
         self.floor.near(among, &self.quads, |rung, corners, mean| each(rung, corners.agrees(mean, law)));
         felt
     }
 
-    /// Solves for the states of the corners as they are.
+    /// Solves for the contact modes as they are.
     #[inline(always)]
-    pub(super) fn solve_for_states(&mut self, rungs: &Range<usize>, among: &Range<usize>, law: &Law) -> Articulated {
-        // What is felt of parts further out must be of the same kind.
+    pub(super) fn solve_with_modes(&mut self, rungs: &Range<usize>, among: &Range<usize>, law: &Law) -> Articulated {
+        // Distal articulated inertias that are kept must be of the same kind, symmetric or not.
         let skew = law.friction == FrictionModel::Coulomb && (!self.outside.is_empty() || self.floor.slides());
         let floor = self.floor.inwards(among);
         if skew {
@@ -341,7 +341,7 @@ mod tests {
 
     fn solve_part(engine: &mut PlanarEngine, rungs: Range<usize>) -> Articulated {
         let (law, among) = (engine.law, engine.floor.among(&rungs));
-        engine.solve_for_states(&rungs, &among, &law)
+        engine.solve_with_modes(&rungs, &among, &law)
     }
 
     fn means(engine: &PlanarEngine) -> Vec<[Lanes; 3]> {

@@ -113,7 +113,7 @@ impl PlanarEngine {
         for (corner, solved) in corners.iter().zip(&*solution) {
             self.add_impulse(corner, solved.impulse);
         }
-        self.solve_for_states(&rungs, &all, law);
+        self.solve_with_modes(&rungs, &all, law);
         for (quad, momentum) in self.quads.iter_mut().zip(momenta) {
             quad.momentum = *momentum;
         }
@@ -150,7 +150,7 @@ impl PlanarEngine {
         let Workspace { corners, solution: into, free, w, matrix, right, lemke, .. } = room;
         let count = corners.len();
         corners.iter().for_each(|corner| self.floor.set_solved(corner.place, corner.lane, OPEN, [0.0; 2]));
-        self.solve_for_states(&rungs, &among, law);
+        self.solve_with_modes(&rungs, &among, law);
         free.clear();
         free.extend(corners.iter().map(|corner| self.floor.excess(corner.place, corner.lane, &self.quads)));
         // Impulses in units of a body's mass: the matrix is of order one then. By rows, of x and z of each corner.
@@ -162,7 +162,7 @@ impl PlanarEngine {
                 let quad = corner.place / 4;
                 let before = self.quads[quad].momentum;
                 self.add_impulse(corner, impulse);
-                self.solve_for_states(&rungs, &among, law);
+                self.solve_with_modes(&rungs, &among, law);
                 self.quads[quad].momentum = before;
                 for (i, (corner, free)) in corners.iter().zip(&*free).enumerate() {
                     let with = self.floor.excess(corner.place, corner.lane, &self.quads);
