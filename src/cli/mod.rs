@@ -126,7 +126,6 @@ impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Self {
         match error {
             ConfigError::Data { .. } => Self::Data(error.to_string()),
-            ConfigError::NotConverged(_) => Self::Simulation(error.to_string()),
             _ => Self::Usage(error.to_string()),
         }
     }

@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde_json::{Value, json};
 
 use super::Failure;
-use crate::experiment::EngineKind;
+use crate::experiment::{EngineKind, Experiment, StepChoice};
 use crate::files::Pending;
 use crate::recording::{Recording, csv, npz};
 
@@ -94,13 +94,13 @@ pub fn finish(file: Pending, bytes: &[u8]) -> Result<(), Failure> {
 }
 
 /// What made a result: command line, resolved experiment, versions, wall time.
-pub fn manifest(experiment: &crate::experiment::Experiment, wall_s: f64, interrupted: bool) -> Value {
+pub fn manifest(experiment: &Experiment, step_choice: Option<&StepChoice>, wall_s: f64, interrupted: bool) -> Value {
     json!({
         "schema": 1,
         "command": std::env::args().collect::<Vec<_>>(),
         "experiment": experiment.config,
         "resolved_cgs": experiment.spec(),
-        "step_choice": experiment.step_choice,
+        "step_choice": step_choice,
         "velocities": match experiment.engine {
             EngineKind::Bullet => json!({
                 "dataPositionVelocities": "as the reference: of the links' centres of mass, one step late; the left end's is its own",

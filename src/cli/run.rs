@@ -87,7 +87,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
             }
             let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
             let text = read(path).map_err(|error| bad(error.to_string()))?;
-            let bodies = export::bodies(&text, &experiment::check(&source)?.robot).map_err(|error| bad(error.to_string()))?;
+            let bodies = export::bodies(&text, &experiment::experiment(&source)?.robot).map_err(|error| bad(error.to_string()))?;
             experiment::with_bodies(&source, &bodies)?
         }
     };
@@ -99,14 +99,6 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
 
     let mut warnings = Vec::new();
-    if let Some(choice) = &experiment.step_choice {
-        let friction = if choice.other_friction.is_some() { ", and with the other friction model" } else { "" };
-        options.remark(&format!(
-            "time step {:.3e} s: the {} of the whole run changes by at most {:.1e} (allowed {:.0e}) in two halvings to it, to an eighth of \
-             it{friction}",
-            choice.time_step_s, choice.measure, choice.change, choice.asked
-        ));
-    }
     // Said before the run, which may take long; the run itself says it again, with its measures left out.
     if let Some(stable) = experiment::unstable(&experiment, 0.0) {
         options.remark(&format!("warning: {}", experiment::step_too_long(experiment.time_step, stable)));
@@ -128,6 +120,12 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let wall = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
     let run = result?;
+    if let Some(choice) = &run.step_choice {
+        options.remark(&format!(
+            "steps of {:.1e} to {:.1e} s, local error {:.0e} cm: the {} changes by {:.1e} (allowed {:.0e}) from a ten times larger one",
+            choice.shortest_step_s, choice.longest_step_s, choice.tolerance_cm, choice.measure, choice.change, choice.asked
+        ));
+    }
     let trouble = run.trouble(&experiment);
     for problem in &trouble {
         // Even when quiet: the result is not what was asked for.
@@ -135,7 +133,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
     let remarks = run.warnings(&experiment);
     remarks.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let Run { mut recording, measures, interrupted, energy, audited, .. } = run;
+    let Run { mut recording, measures, interrupted, energy, audited, step_choice, .. } = run;
     let steps = recording.meta.steps;
     if interrupted {
         let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
@@ -159,7 +157,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
             "measures": measures,
             "energy": audited.then_some(energy),
             "time_step_s": experiment.time_step,
-            "step_choice": experiment.step_choice,
+            "step_choice": step_choice,
             "steps": steps,
             "records": recording.len(),
             "simulated_s": steps as f64 * experiment.time_step,
@@ -193,7 +191,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         finish(file, text.as_bytes())?;
     }
     if let Some(output) = output {
-        output.write(&recording, &manifest(&experiment, wall, interrupted))?;
+        output.write(&recording, &manifest(&experiment, step_choice.as_ref(), wall, interrupted))?;
     }
     if let Some(path) = saved {
         options.remark(&format!("saved to {}", path.display()));

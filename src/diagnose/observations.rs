@@ -106,7 +106,7 @@ pub(super) fn check(nominal: &Config, observation: &Observation) -> Result<(), F
     }
     let config = config(nominal, observation).map_err(|message| Fault::at("measure", message))?;
     let text = toml::to_string(&config).map_err(|error| Fault::at("measure", error.to_string()))?;
-    let experiment = experiment::check(&Source::from_text(measure, text)).map_err(|error| match error {
+    let experiment = experiment::experiment(&Source::from_text(measure, text)).map_err(|error| match error {
         ConfigError::Value { key, message, .. } => Fault::At { key, message },
         other => Fault::Other(other),
     })?;

@@ -111,7 +111,7 @@ impl Drive {
     }
 
     /// A time (s) up to which the voltages are those at `t`: their next jump, but for what rounding may move it by.
-    fn holds_until(&self, t: f64) -> f64 {
+    pub(crate) fn holds_until(&self, t: f64) -> f64 {
         let t = if self.delay == 0.0 { t } else { (t - self.delay).max(0.0) };
         let jump = match &self.waveform {
             Waveform::Gait { gait, parameter, .. } => gait.phase_end(t, *parameter),
@@ -127,6 +127,21 @@ impl Drive {
             Waveform::Sine { .. } | Waveform::Table(_) => t,
         };
         (jump + self.delay) * (1.0 - ROUNDING)
+    }
+
+    /// The next time (s) after `t` at which voltages jump, but for what rounding may move it by; none of what changes smoothly, or a table.
+    pub(crate) fn next_jump(&self, t: f64) -> f64 {
+        if self.jumps() { self.holds_until(t) } else { f64::INFINITY }
+    }
+
+    /// Writes the mean voltages (V) from `from` to `to` (s), between which none jumps: what changes smoothly is taken at the middle, and a
+    /// table's lines are integrated.
+    pub(crate) fn mean_without_jump(&self, from: f64, to: f64, out: &mut [f64]) {
+        match &self.waveform {
+            // Exact, also where a table jumps.
+            Waveform::Table(table) if self.positive_gain == 1.0 => table.mean(from - self.delay, to - self.delay, out),
+            _ => self.voltages(0.5 * (from + to), out),
+        }
     }
 
     /// The period of the waveform (s), if it repeats.
@@ -157,6 +172,11 @@ impl<'a> Means<'a> {
         Self { drive, start: voltages, until: drive.holds_until(start) }
     }
 
+    /// The drive itself.
+    pub(crate) fn drive(&self) -> &'a Drive {
+        self.drive
+    }
+
     /// Mean voltages (V) from `from` to `to` (s) into `out`: a jump within counts from its moment on, what changes smoothly is taken at the
     /// middle, and a table's lines are integrated.
     pub fn over(&mut self, from: f64, to: f64, out: &mut [f64]) {
@@ -164,12 +184,8 @@ impl<'a> Means<'a> {
         if to < self.until {
             return out.copy_from_slice(&self.start);
         }
-        if let (Waveform::Table(table), true) = (&drive.waveform, drive.positive_gain == 1.0) {
-            // Exact, also where a table jumps.
-            return table.mean(from - drive.delay, to - drive.delay, out);
-        }
         if !drive.jumps() {
-            return drive.voltages(0.5 * (from + to), out);
+            return drive.mean_without_jump(from, to, out);
         }
         drive.voltages(to, out);
         self.until = drive.holds_until(to);

@@ -65,6 +65,10 @@ impl Engine for AffectedEngine {
         self.engine.places(nodes)
     }
 
+    fn landing(&mut self, least: f64) -> f64 {
+        self.engine.landing(least)
+    }
+
     fn motor_voltages(&self) -> &[f64] {
         self.engine.motor_voltages()
     }
@@ -104,8 +108,30 @@ impl Engine for AffectedEngine {
         self.engine.midpoint()
     }
 
-    fn turns(&self) -> [f64; 2] {
-        self.engine.turns()
+    fn work_sums(&self) -> [f64; 2] {
+        self.engine.work_sums()
+    }
+
+    fn set_time_step(&mut self, time_step: f64, ahead: f64) -> Result<(), EngineError> {
+        self.time_step = time_step;
+        self.engine.set_time_step(time_step, ahead)
+    }
+
+    fn set_step(&mut self, step: u64) {
+        self.engine.set_step(step);
+    }
+
+    /// The path's memory, then the engine's checkpoint.
+    fn checkpoint(&self, into: &mut Vec<f64>) -> Result<(), EngineError> {
+        into.extend(self.path.save());
+        self.engine.checkpoint(into)
+    }
+
+    fn rewind(&mut self, checkpoint: &[f64]) -> Result<(), EngineError> {
+        let held = self.path.held(checkpoint).ok_or(EngineError::State)?;
+        let (memory, rest) = checkpoint.split_at(held);
+        self.path.load(memory);
+        self.engine.rewind(rest)
     }
 
     fn kinetic_energy(&self) -> Option<f64> {

@@ -122,8 +122,8 @@ pub struct Books {
     begun: bool,
     /// Steps until something is to be taken in, of an engine that works at the middle of steps.
     pause: u64,
-    /// [`Engine::turns`] of such an engine when something was last taken in.
-    turns_before: [f64; 2],
+    /// [`Engine::work_sums`] of such an engine when something was last taken in.
+    work_sums_before: [f64; 2],
     ground_energy: f64,
     numerical_before: f64,
     account: f64,
@@ -154,7 +154,7 @@ impl Books {
             before: JointState::default(),
             begun: false,
             pause: 0,
-            turns_before: [0.0; 2],
+            work_sums_before: [0.0; 2],
             ground_energy: 0.0,
             numerical_before: 0.0,
             account: 0.0,
@@ -165,11 +165,11 @@ impl Books {
         }
     }
 
-    /// Takes in the state before a step, after [`Engine::prepare`].
+    /// Takes in the state before a step, at `time` (s), after [`Engine::prepare`].
     ///
     /// # Errors
     /// Whatever the engine reports when it is read.
-    pub fn take(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
+    pub fn take(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
         if self.pause > 0 {
             self.pause -= 1;
             return Ok(());
@@ -191,7 +191,7 @@ impl Books {
             self.before.clone_from(engine.joints());
         }
         if looks {
-            self.look(engine)?;
+            self.look(time, engine)?;
             self.begun = true;
         }
         Ok(())
@@ -202,9 +202,9 @@ impl Books {
         let per_volt = self.joint.rest_angle_per_volt;
         if midpoint {
             // Torques and rates of the middle of the step: the rate is the turn over the step.
-            let turns = engine.turns();
-            let before = std::mem::replace(&mut self.turns_before, turns);
-            return [(turns[0] - before[0]) * per_volt, (turns[1] - before[1]) / self.time_step];
+            let sums = engine.work_sums();
+            let before = std::mem::replace(&mut self.work_sums_before, sums);
+            return [(sums[0] - before[0]) * per_volt, sums[1] - before[1]];
         }
         let (joints, b) = (engine.joints(), &self.before);
         let (mut electrical, mut heat) = (0.0, 0.0);
@@ -223,7 +223,7 @@ impl Books {
         EnergyBalance { fault: first.map(|rise| EnergyFault { time_s: rise.time, link: rise.link }), ..self.balance }
     }
 
-    fn look(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
+    fn look(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
         let known = (engine.kinetic_energy(), engine.gravitational_energy());
         let (kinetic, height) = if let (Some(kinetic), Some(height)) = known {
             (kinetic, height)
@@ -268,7 +268,7 @@ impl Books {
         if height > 2.0 * self.rises.last().map_or(0.0, |rise| rise.height) {
             let most = self.gained.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
             let link = most.filter(|(_, gain)| **gain > 0.0).map(|(link, _)| link);
-            self.rises.push(Rise { height, time: engine.step() as f64 * self.time_step, link });
+            self.rises.push(Rise { height, time, link });
         }
         Ok(())
     }

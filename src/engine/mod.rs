@@ -52,6 +52,9 @@ pub enum EngineError {
         /// The longest (s).
         longest: f64,
     },
+    /// An engine whose steps are all of one length.
+    #[error("this engine's steps are all of one length; adaptive steps need engine = \"planar\"")]
+    FixedStep,
     /// A time step that is no step.
     #[error("the time step is {time_step} s, but must be a positive number")]
     TimeStep {
@@ -66,6 +69,9 @@ pub enum EngineError {
         /// How many there must be.
         needed: usize,
     },
+    /// A result that finer steps still change.
+    #[error("{0}")]
+    NotResolved(String),
     /// A robot that comes to rest nowhere.
     #[error("there is no equilibrium to start from: {reason}")]
     NoEquilibrium {
@@ -94,6 +100,14 @@ pub enum EngineError {
 impl EngineError {
     fn unless_step(time_step: f64) -> Result<(), Self> {
         if time_step.is_finite() && time_step > 0.0 { Ok(()) } else { Err(Self::TimeStep { time_step }) }
+    }
+
+    /// The same at a step and time (s) that are counted otherwise.
+    pub(crate) fn at(mut self, (at_step, at_time): (u64, f64)) -> Self {
+        if let Self::NotConverged { step, time, .. } | Self::NotFinite { step, time, .. } = &mut self {
+            (*step, *time) = (at_step, at_time);
+        }
+        self
     }
 
     fn unless_voltages(given: usize, needed: usize) -> Result<(), Self> {
@@ -203,6 +217,11 @@ pub trait Engine {
     /// As [`nodes`](Self::nodes).
     fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError>;
 
+    /// Time (s) in which the first corner that comes down faster than `least` (cm/s) lands, if all go on as they move now; infinite where none does.
+    fn landing(&mut self, _least: f64) -> f64 {
+        f64::INFINITY
+    }
+
     /// Voltages on the joints (V) since [`prepare`](Self::prepare).
     fn motor_voltages(&self) -> &[f64];
 
@@ -241,15 +260,44 @@ pub trait Engine {
     /// If the numbers are not a state of this robot; nothing is changed then.
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError>;
 
+    /// Makes the coming steps `time_step` (s) long, in which no corner may come so low that it would be under the floor `ahead` (s) after the step.
+    /// What is prepared is prepared for the old step.
+    ///
+    /// # Errors
+    /// [`EngineError::FixedStep`] of an engine whose steps are all of one length.
+    fn set_time_step(&mut self, _time_step: f64, _ahead: f64) -> Result<(), EngineError> {
+        Err(EngineError::FixedStep)
+    }
+
+    /// Counts the coming steps on from `step`.
+    fn set_step(&mut self, _step: u64) {}
+
+    /// Adds to `into` what [`rewind`](Self::rewind) needs for taking the coming steps again, with the voltages prepared anew.
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn checkpoint(&self, into: &mut Vec<f64>) -> Result<(), EngineError> {
+        into.extend(self.save()?);
+        Ok(())
+    }
+
+    /// Goes back to a [`checkpoint`](Self::checkpoint) of this engine; the number of steps stays.
+    ///
+    /// # Errors
+    /// Whatever the engine's library reports.
+    fn rewind(&mut self, checkpoint: &[f64]) -> Result<(), EngineError> {
+        self.load(self.step(), checkpoint)
+    }
+
     /// Whether drive, springs and dampers act at the middle of a step. Otherwise they act as in the reference: at its start, with the
     /// voltages of the step before.
     fn midpoint(&self) -> bool {
         false
     }
 
-    /// Sums over the joints and all steps so far of voltage times turn (V·rad) and of the turn's square (rad²), of an engine that works at
-    /// the middle of steps: the books of energy read what they grow by.
-    fn turns(&self) -> [f64; 2] {
+    /// Sums over the joints and all steps so far of voltage times turn (V·rad) and of the turn's square over the step (rad²/s), of an engine
+    /// that works at the middle of steps: the energy audit reads what they grow by.
+    fn work_sums(&self) -> [f64; 2] {
         [0.0; 2]
     }
 

@@ -1,47 +1,56 @@
-//! Choosing the time step: the coarsest at which nothing that can be compared says that the result would be another.
+//! `time_step_s = "auto"`: steps that adapt, with a tolerance that is tightened until the result stays.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::config::{Config, ConfigError, Fault, StepConfig};
+use super::adaptive::{self, LONGEST, StepCount, Stopped};
+use super::config::{Config, Fault, StepConfig};
 use super::resolve::Trouble;
-use super::{Control, Experiment, run};
-use crate::engine::FrictionModel;
-use crate::model::{Mount, Robot};
+use super::run::{Control, Run};
+use super::{EngineKind, Experiment};
+use crate::engine::{Engine, EngineError, FrictionModel};
+use crate::model::Mount;
 use crate::recording::definitions;
 use crate::words::{not_one_of, number};
 
-/// Share of the result that another step may change, where a file does not say.
+/// Share of the result that a tighter tolerance may change, where a file does not say.
 pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
-/// Where the search begins (s), and the finest step that it chooses.
-const COARSEST: f64 = 1e-3;
-const FINEST: f64 = 1e-7;
-/// Halvings from a step to the far finer one that must confirm it. Contact has plateaus, on which a halving changes little and eight times
-/// finer steps change all: with the convex model a mover on films of friction 4 moves 2.8 mm at all steps from 2.5·10⁻⁴ to 6·10⁻⁵ s, and 6.2 mm at an eighth.
-const FAR: usize = 3;
-/// Coulomb's law may differ from the convex model by this, whatever error is allowed: on that plateau they differ by 3 % and more (measured).
-const MODELS: f64 = 0.01;
-/// Steps of all trial runs together: this many, or those of so many runs by [`COARSEST`] if that is more. Some seconds for a robot of five actuators.
-const BUDGET: u64 = 4_000_000;
-const BUDGET_RUNS: u64 = 200;
-/// Records of a trial run.
-const RECORDS: f64 = 200.0;
+/// Times of records are multiples of this (s) or less.
+const GRID: f64 = 1e-4;
+/// The loosest tolerance, as a share of the robot's length and of the error that is allowed, and the factor to the next.
+const LOOSEST: f64 = 2e-6;
+const TIGHTER: f64 = 0.1;
+/// Runs with ever tighter tolerances.
+const RUNS: usize = 4;
+/// Steps of one run at most: this many, or those of so many per longest step if that is more.
+const MOST_STEPS: u64 = 2_000_000;
+const MOST_STEPS_OF_LONGEST: u64 = 500;
+/// Changes of all coefficients of friction that should change a result by nothing that can be seen.
+const PERTURBATIONS: [f64; 4] = [-2e-6, -1e-6, 1e-6, 2e-6];
 /// Values below this (mm, deg, Hz, –) are zero but for rounding.
 const ZERO: f64 = 1e-6;
 
-/// One trial run.
+/// What a run with adaptive steps is to be exact in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accuracy {
+    /// The measure; otherwise the path of all nodes over all records.
+    pub measure: Option<String>,
+    /// Share of it that a ten times tighter tolerance may change.
+    pub error: f64,
+}
+
+/// A run with one tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepTrial {
-    /// Its step (s).
-    pub time_step_s: f64,
-    /// Its friction model.
-    pub friction: &'static str,
+    /// Largest local error of a step (cm).
+    pub tolerance_cm: f64,
+    /// Steps taken, halves and rejected ones included.
+    pub steps: u64,
     /// The measure that is compared; absent for `trajectory`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Relative change from twice the step, if there is a run of that.
+    /// Relative change from the ten times larger tolerance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<f64>,
     /// Why it gave no result.
@@ -49,65 +58,31 @@ pub struct StepTrial {
     pub failed: Option<String>,
 }
 
-/// How a time step was chosen.
+/// How the steps of a run were chosen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StepChoice {
-    /// The step (s).
-    pub time_step_s: f64,
     /// What was compared: a measure's name, or `trajectory` for all nodes over all records.
     pub measure: String,
-    /// Largest of the relative changes below.
+    /// Relative change from a ten times larger tolerance to the run's.
     pub change: f64,
-    /// Largest change that was allowed.
+    /// The largest that was allowed.
     pub asked: f64,
-    /// From four times the step to twice, and from twice to the step.
-    pub halvings: [f64; 2],
-    /// From the step to an eighth of it.
-    pub to_an_eighth: f64,
-    /// From the convex model of friction to Coulomb's law at the same step; absent with Coulomb's law and where nothing touches a floor.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub other_friction: Option<f64>,
-    /// All trial runs, each over the whole duration.
+    /// The run's tolerance (cm).
+    pub tolerance_cm: f64,
+    /// The shortest and longest step of the run (s), of impacts apart.
+    pub shortest_step_s: f64,
+    /// See there.
+    pub longest_step_s: f64,
+    /// All runs; the last is the one whose results are given.
     pub trials: Vec<StepTrial>,
 }
 
-/// What a trial run gives to compare.
-enum Seen {
-    Value(f64),
-    /// Places of the nodes (cm) in all records, and how many numbers a record has.
-    Path(Vec<f64>, usize),
-}
-
-/// Trial runs by friction model, each by the number of halvings of its step.
-struct Trials<'a> {
-    at: &'a dyn Fn(f64, Option<FrictionModel>, f64) -> Result<Experiment, Trouble>,
-    measure: Option<&'a str>,
-    duration: f64,
-    coarsest: f64,
-    steps: u64,
-    done: BTreeMap<(bool, usize), Result<Seen, String>>,
-}
-
-/// Why a search ends without a step.
-enum End {
-    Trouble(Trouble),
-    Budget,
-}
-
-/// Chooses the step of a config with `time_step_s = "auto"` and resolves it with that step. The whole run is simulated with steps of 1 ms,
-/// 0.5 ms and so on, until at most `step_error` is changed by the last two halvings and by an eighth of the step and, with the convex model of
-/// friction on a floor, at most that and 1 % by Coulomb's law. Compared is the named measure, relative to itself, or the path of all nodes (root of the
-/// mean square) relative to how far they go.
-pub(super) fn choose(
-    config: &Config,
-    robot: &Robot,
-    trials: bool,
-    resolve: impl Fn(&Config) -> Result<Experiment, Trouble>,
-) -> Result<Experiment, Trouble> {
+/// Resolves a config with `time_step_s = "auto"`: the experiment's time step is that of its records.
+pub(super) fn resolve(config: &Config, resolve: impl Fn(&Config) -> Result<Experiment, Trouble>) -> Result<Experiment, Trouble> {
     let s = &config.simulation;
-    let asked = s.step_error.unwrap_or(DEFAULT_STEP_ERROR);
-    if !(asked > 0.0 && asked < 1.0) {
-        return Err(Fault::new("simulation.step_error", format!("is {}, but must lie between 0 and 1", number(asked))).into());
+    let error = s.step_error.unwrap_or(DEFAULT_STEP_ERROR);
+    if !(error > 0.0 && error < 1.0) {
+        return Err(Fault::new("simulation.step_error", format!("is {}, but must lie between 0 and 1", number(error))).into());
     }
     if let Some(name) = &s.step_measure
         && !definitions::names().contains(&name.as_str())
@@ -117,187 +92,205 @@ pub(super) fn choose(
     let Some(duration) = s.duration_s else {
         return Err(Fault::new("simulation.duration_s", "is missing; time_step_s = \"auto\" does not go with steps").into());
     };
-    let at = |step: f64, friction: Option<FrictionModel>, record: Option<f64>| {
-        let mut config = config.clone();
-        let s = &mut config.simulation;
-        (s.step_error, s.step_measure) = (None, None);
-        s.time_step_s = Some(StepConfig::Seconds(step));
-        if let Some(friction) = friction {
-            s.friction = Some(name_of(friction).into());
-        }
-        if record.is_some() {
-            (s.record_every_s, s.record_every_steps, s.record_from_step) = (record, None, None);
-        }
-        resolve(&config)
-    };
-    // Checks everything else.
-    let checked = at(COARSEST.min(duration), None, Some(duration))?;
-    if !trials {
-        return Ok(checked);
+    // Parts of the duration and of the longest step, whatever is recorded; a duration that is none is told by what comes.
+    let longest = duration / (duration / LONGEST).ceil();
+    let record = s.record_every_s.filter(|every| *every > 0.0).unwrap_or(GRID).min(GRID);
+    let mut fixed = config.clone();
+    fixed.simulation.time_step_s = Some(StepConfig::Seconds(longest / (longest / record).ceil()));
+    (fixed.simulation.step_error, fixed.simulation.step_measure) = (None, None);
+    let mut experiment = resolve(&fixed)?;
+    if experiment.robot.mount == Mount::Ground && experiment.friction == FrictionModel::Convex {
+        let message = "convex does not go with time_step_s = \"auto\": its error depends on the step; give one in seconds, or take coulomb";
+        return Err(Fault::new("simulation.friction", message).into());
     }
-    let ours = checked.friction;
-    let other = (robot.mount == Mount::Ground && ours == FrictionModel::Convex).then_some(FrictionModel::Coulomb);
-    let mut trials = Trials {
-        at: &|step, friction, record| at(step, friction, Some(record)),
-        measure: s.step_measure.as_deref(),
-        duration,
-        coarsest: duration / (duration / COARSEST).ceil(),
-        steps: 0,
-        done: BTreeMap::new(),
-    };
-    match trials.search(ours, other, asked) {
-        Ok(Some(mut choice)) => {
-            let mut experiment = at(choice.time_step_s, None, None)?;
-            choice.time_step_s = experiment.time_step;
-            experiment.step_choice = Some(choice);
-            experiment.config = config.clone();
-            Ok(experiment)
-        }
-        Ok(None) => Err(trials.not_converged(asked, "no step of 1e-7 s or more keeps it")),
-        Err(End::Budget) => Err(trials.not_converged(asked, &format!("finer steps would take more than {BUDGET} in all to try"))),
-        Err(End::Trouble(trouble)) => Err(trouble),
+    if crate::effects::time_step_scale(&experiment.effects) != 1.0 {
+        let message = "auto does not go with the effect discretisation's time_step_scale";
+        return Err(Fault::new("simulation.time_step_s", message).into());
     }
+    experiment.accuracy = Some(Accuracy { measure: s.step_measure.clone(), error });
+    experiment.config = config.clone();
+    Ok(experiment)
 }
 
-fn name_of(friction: FrictionModel) -> &'static str {
-    match friction {
-        FrictionModel::Convex => "convex",
-        FrictionModel::Coulomb => "coulomb",
-    }
+/// What a run gives to compare.
+enum Seen {
+    Value(f64),
+    /// Places of the nodes (cm) in all records, and how many numbers a record has.
+    Path(Vec<f64>, usize),
 }
 
-impl Trials<'_> {
-    fn step(&self, level: usize) -> f64 {
-        self.coarsest / (1_u64 << level) as f64
-    }
-
-    fn budget(&self) -> u64 {
-        BUDGET.max(BUDGET_RUNS * (self.duration / self.coarsest) as u64)
-    }
-
-    fn search(&mut self, ours: FrictionModel, other: Option<FrictionModel>, asked: f64) -> Result<Option<StepChoice>, End> {
-        let coarsest = self.coarsest;
-        for level in (0..).take_while(|level| coarsest / (1_u64 << level) as f64 > FINEST) {
-            self.run(ours, level)?;
-            let Some(before) = level.checked_sub(2) else { continue };
-            let Some(halvings) = self.change(ours, before, before + 1).zip(self.change(ours, before + 1, level)) else {
-                continue;
-            };
-            if halvings.0.max(halvings.1) > asked {
+/// Runs an experiment with ever tighter tolerances until its result changes by less than is allowed.
+pub(super) fn run(
+    experiment: &Experiment,
+    accuracy: &Accuracy,
+    engine: &mut dyn Engine,
+    mut observe: impl FnMut(u64) -> Control,
+) -> Result<Run, EngineError> {
+    let (first, start) = (engine.step(), engine.save()?);
+    let mut ladder = Ladder::new(experiment, accuracy, first);
+    for level in 0..RUNS {
+        if level > 0 {
+            engine.load(first, &start)?;
+        }
+        let (run, count) = match ladder.run(experiment, level, engine, &mut observe) {
+            Ok(done) => done,
+            Err(Stopped::TooLong) => return Err(ladder.not_converged("finer steps would be too many")),
+            // Finer steps may do better.
+            Err(Stopped::Failed(error)) if level + 1 < RUNS && matches!(error, EngineError::NotConverged { .. }) => {
+                ladder.failed(level, error.to_string());
                 continue;
             }
-            let mut other_friction = None;
-            if let Some(other) = other {
-                self.run(other, level)?;
-                other_friction = self.difference((ours, level), (other, level));
-                if other_friction.is_none_or(|difference| difference > asked.min(MODELS)) {
-                    continue;
-                }
-            }
-            self.run(ours, level + FAR)?;
-            let Some(far) = self.change(ours, level, level + FAR).filter(|far| *far <= asked) else { continue };
-            return Ok(Some(StepChoice {
-                time_step_s: self.step(level),
-                measure: self.measure.unwrap_or("trajectory").into(),
-                change: halvings.0.max(halvings.1).max(far).max(other_friction.unwrap_or(0.0)),
-                asked,
-                halvings: [halvings.0, halvings.1],
-                to_an_eighth: far,
-                other_friction,
-                trials: self.table(),
-            }));
-        }
-        Ok(None)
-    }
-
-    /// Does a trial run unless it is done.
-    fn run(&mut self, friction: FrictionModel, level: usize) -> Result<(), End> {
-        let key = (friction == FrictionModel::Coulomb, level);
-        if self.done.contains_key(&key) {
-            return Ok(());
-        }
-        let step = self.step(level);
-        self.steps += (self.duration / step) as u64;
-        if self.steps > self.budget() {
-            return Err(End::Budget);
-        }
-        let every = (self.duration / self.coarsest / RECORDS).ceil() * self.coarsest;
-        let trial = (self.at)(step, Some(friction), every).map_err(End::Trouble)?;
-        // A step that is too coarse for the robot may fail; a finer one need not.
-        let run = trial.engine().and_then(|mut engine| run(&trial, engine.as_mut(), |_| Control::Continue));
-        let seen = match run {
-            Err(error) => Err(error.to_string()),
-            Ok(run) => match (run.trouble(&trial).pop(), self.measure) {
-                (Some(trouble), _) => Err(trouble),
-                (None, None) => Ok(Seen::Path(run.recording.positions, 3 * (trial.robot.joints() + 2))),
-                (None, Some(name)) => {
-                    let value = run.measures.get(name).ok_or_else(|| {
-                        let reason = format!("{name} cannot be had from the {} s of this experiment", self.duration);
-                        End::Trouble(Fault::new("simulation.step_measure", reason).into())
-                    })?;
-                    Ok(Seen::Value(value))
-                }
-            },
+            Err(Stopped::Failed(error)) => return Err(error),
         };
-        self.done.insert(key, seen);
+        if run.interrupted {
+            return Ok(run);
+        }
+        let trouble = run.trouble(experiment).pop();
+        let known = ladder.troubled && trouble.is_some();
+        ladder.take(level, &run, count, trouble)?;
+        if known {
+            // Measures are not given, whatever the steps.
+            return Ok(run);
+        }
+        if let Some(change) = ladder.trials.last().and_then(|trial| trial.change).filter(|change| *change <= accuracy.error) {
+            return Ok(Run { step_choice: Some(ladder.choice(change, level, count)), ..run });
+        }
+    }
+    let spread = if first == 0 { ladder.spread(experiment) } else { None };
+    Err(ladder.not_converged(&spread.unwrap_or_else(|| "a tighter tolerance would need steps below what rounding allows".into())))
+}
+
+/// The runs so far.
+struct Ladder<'a> {
+    accuracy: &'a Accuracy,
+    loosest: f64,
+    most_steps: u64,
+    trials: Vec<StepTrial>,
+    last: Option<Seen>,
+    /// Whether the last run had trouble that leaves no measures.
+    troubled: bool,
+}
+
+impl<'a> Ladder<'a> {
+    fn new(experiment: &Experiment, accuracy: &'a Accuracy, first: u64) -> Self {
+        let robot = &experiment.robot;
+        let length = robot.material.actuator_length * robot.actuators as f64;
+        let longest_steps = (experiment.steps.saturating_sub(first) as f64 * experiment.time_step / LONGEST) as u64;
+        Self {
+            accuracy,
+            loosest: LOOSEST * length * accuracy.error,
+            most_steps: MOST_STEPS.max(longest_steps.saturating_mul(MOST_STEPS_OF_LONGEST)),
+            trials: Vec::new(),
+            last: None,
+            troubled: false,
+        }
+    }
+
+    fn tolerance(&self, level: usize) -> f64 {
+        self.loosest * TIGHTER.powi(level as i32)
+    }
+
+    fn run(
+        &self,
+        experiment: &Experiment,
+        level: usize,
+        engine: &mut dyn Engine,
+        observe: impl FnMut(u64) -> Control,
+    ) -> Result<(Run, StepCount), Stopped> {
+        adaptive::run(experiment, self.tolerance(level), self.most_steps, engine, observe)
+    }
+
+    fn failed(&mut self, level: usize, why: String) {
+        let tolerance_cm = self.tolerance(level);
+        self.trials.push(StepTrial { tolerance_cm, steps: 0, value: None, change: None, failed: Some(why) });
+        self.last = None;
+    }
+
+    /// Takes a run's result in.
+    fn take(&mut self, level: usize, run: &Run, count: StepCount, trouble: Option<String>) -> Result<(), EngineError> {
+        self.troubled = trouble.is_some();
+        let seen = if trouble.is_some() { None } else { Some(self.seen(run)?) };
+        let change = self.last.as_ref().zip(seen.as_ref()).map(|(before, now)| difference(before, now));
+        let value = if let Some(Seen::Value(value)) = seen { Some(value) } else { None };
+        self.trials.push(StepTrial { tolerance_cm: self.tolerance(level), steps: count.taken, value, change, failed: trouble });
+        self.last = seen;
         Ok(())
     }
 
-    fn change(&self, friction: FrictionModel, coarse: usize, fine: usize) -> Option<f64> {
-        self.difference((friction, coarse), (friction, fine))
-    }
-
-    /// Relative difference of two trial runs, if both gave a result.
-    fn difference(&self, coarse: (FrictionModel, usize), fine: (FrictionModel, usize)) -> Option<f64> {
-        let seen = |(friction, level)| self.done.get(&(friction == FrictionModel::Coulomb, level))?.as_ref().ok();
-        Some(match (seen(coarse)?, seen(fine)?) {
-            (Seen::Value(a), Seen::Value(b)) if a.abs().max(b.abs()) < ZERO => 0.0,
-            (Seen::Value(a), Seen::Value(b)) => ((a - b) / b).abs(),
-            (Seen::Path(a, width), Seen::Path(b, _)) => path_change(a, b, *width),
-            _ => return None,
+    fn seen(&self, run: &Run) -> Result<Seen, EngineError> {
+        let Some(name) = self.accuracy.measure.as_deref() else {
+            return Ok(Seen::Path(run.recording.positions.clone(), 3 * run.recording.nodes()));
+        };
+        run.measures.get(name).map(Seen::Value).ok_or_else(|| {
+            EngineError::NotResolved(format!("simulation.step_measure: {name} cannot be had from this experiment; take another or a longer run"))
         })
     }
 
-    fn table(&self) -> Vec<StepTrial> {
-        let row = |(&(coulomb, level), seen): (&(bool, usize), &Result<Seen, String>)| {
-            let friction = if coulomb { FrictionModel::Coulomb } else { FrictionModel::Convex };
-            StepTrial {
-                time_step_s: self.step(level),
-                friction: name_of(friction),
-                value: if let Ok(Seen::Value(value)) = seen { Some(*value) } else { None },
-                change: level.checked_sub(1).and_then(|twice| self.change(friction, twice, level)),
-                failed: seen.as_ref().err().cloned(),
-            }
-        };
-        self.done.iter().map(row).collect()
+    fn choice(self, change: f64, level: usize, count: StepCount) -> StepChoice {
+        StepChoice {
+            measure: self.accuracy.measure.clone().unwrap_or_else(|| "trajectory".into()),
+            change,
+            asked: self.accuracy.error,
+            tolerance_cm: self.tolerance(level),
+            shortest_step_s: count.shortest,
+            longest_step_s: count.longest,
+            trials: self.trials,
+        }
     }
 
-    fn not_converged(&self, asked: f64, reason: &str) -> Trouble {
-        let mut text = format!("the {} is not converged to {asked:e}: {reason}.", self.measure.unwrap_or("trajectory"));
-        let table = self.table();
-        for friction in ["convex", "coulomb"] {
-            let mut rows = table.iter().filter(|row| row.friction == friction).peekable();
-            if rows.peek().is_none() {
-                continue;
-            }
-            let _ = write!(text, " With friction = \"{friction}\"");
-            for (index, row) in rows.enumerate() {
-                let separator = if index == 0 { ": " } else { "; " };
-                let _ = write!(text, "{separator}{:.2e} s", row.time_step_s);
-                let _ = match (row.value, row.change, &row.failed) {
-                    (Some(value), ..) => write!(text, " {value:.5}"),
-                    (_, Some(change), _) => write!(text, " changes by {change:.1e}"),
-                    (.., Some(_)) => write!(text, " failed"),
-                    _ => Ok(()),
-                };
-            }
-            text.push('.');
+    /// What the measure spreads over when friction is changed by next to nothing, if that is more than is allowed.
+    fn spread(&self, experiment: &Experiment) -> Option<String> {
+        let name = self.accuracy.measure.as_deref()?;
+        if experiment.robot.mount != Mount::Ground || experiment.engine != EngineKind::Planar {
+            return None;
+        }
+        let values: Vec<f64> = PERTURBATIONS
+            .iter()
+            .filter_map(|by| {
+                let mut other = experiment.clone();
+                other.robot.friction.ground *= 1.0 + by;
+                let mut engine = other.engine().ok()?;
+                let (run, _) = self.run(&other, 1, engine.as_mut(), |_| Control::Continue).ok()?;
+                run.measures.get(name)
+            })
+            .collect();
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+        (values.len() > 1 && high - low > self.accuracy.error * low.abs().max(high.abs())).then(|| {
+            format!(
+                "the motion is chaotic: when all friction changes by {:e} or less of itself, it spreads from {low:.5} to {high:.5}",
+                PERTURBATIONS[3]
+            )
+        })
+    }
+
+    fn not_converged(&self, reason: &str) -> EngineError {
+        let what = self.accuracy.measure.as_deref().unwrap_or("trajectory");
+        let mut text = format!("the {what} is not converged to {:e}: {reason}.", self.accuracy.error);
+        for (index, trial) in self.trials.iter().enumerate() {
+            let separator = if index == 0 { " With local errors of at most" } else { ";" };
+            let _ = write!(text, "{separator} {:.0e} cm", trial.tolerance_cm);
+            let _ = match (trial.value, trial.change, &trial.failed) {
+                (Some(value), ..) => write!(text, " {value:.5}"),
+                (_, Some(change), _) => write!(text, " changes by {change:.1e}"),
+                (.., Some(why)) => write!(text, " failed ({why})"),
+                _ => Ok(()),
+            };
         }
         text.push_str(
-            " Try a larger simulation.step_error, a step_measure that depends less on each impact, a shorter duration_s or less friction, \
+            ". Try a larger simulation.step_error, a step_measure that depends less on each impact, a shorter duration_s or less friction, \
              or set time_step_s yourself and compare with finer ones",
         );
-        Trouble::Config(ConfigError::NotConverged(text))
+        EngineError::NotResolved(text)
+    }
+}
+
+/// Relative difference of what two runs gave.
+fn difference(coarse: &Seen, fine: &Seen) -> f64 {
+    match (coarse, fine) {
+        (Seen::Value(a), Seen::Value(b)) if a.abs().max(b.abs()) < ZERO => 0.0,
+        (Seen::Value(a), Seen::Value(b)) => ((a - b) / b).abs(),
+        (Seen::Path(a, width), Seen::Path(b, _)) => path_change(a, b, *width),
+        _ => f64::INFINITY,
     }
 }
 

@@ -41,9 +41,6 @@ pub enum ConfigError {
         /// What is wrong, and what to try.
         message: String,
     },
-    /// `time_step_s = "auto"` found no step whose result can be promised; says what it saw at which steps.
-    #[error("simulation.time_step_s: {0}")]
-    NotConverged(String),
     /// A file that the experiment refers to is damaged.
     #[error("{}: {reason}", path.display())]
     Data {

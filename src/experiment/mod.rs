@@ -1,5 +1,6 @@
 //! An experiment: a robot, what drives it, and how long it is simulated.
 
+mod adaptive;
 mod auto;
 mod config;
 mod drive_csv;
@@ -12,7 +13,7 @@ mod state;
 
 #[cfg(test)]
 pub(crate) use auto::DEFAULT_STEP_ERROR;
-pub use auto::{StepChoice, StepTrial};
+pub use auto::{Accuracy, StepChoice, StepTrial};
 pub(crate) use config::line_of;
 pub use config::{
     Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, Setting,
@@ -20,7 +21,7 @@ pub use config::{
 };
 pub use range::Bending;
 pub(crate) use range::{step_too_long, unstable};
-pub use resolve::{check, experiment, with_bodies};
+pub use resolve::{experiment, with_bodies};
 pub(crate) use run::hermite;
 pub use run::{Control, Run, run};
 pub use state::SavedState;
@@ -51,6 +52,8 @@ pub struct Experiment {
     pub drive: Drive,
     /// Time step (s).
     pub time_step: f64,
+    /// What steps that adapt are chosen for, if they do; `time_step` is that of the records then.
+    pub accuracy: Option<Accuracy>,
     /// Number of steps.
     pub steps: u64,
     /// A record is taken every so many steps, and at the first and last.
@@ -67,8 +70,6 @@ pub struct Experiment {
     pub numerical_damping: Option<f64>,
     /// Extensions of the model; those that act on robot and drive are in them already.
     pub effects: Vec<Applied>,
-    /// How the time step was chosen, if the program chose it.
-    pub step_choice: Option<StepChoice>,
     /// The keys as they were given.
     pub config: Config,
 }

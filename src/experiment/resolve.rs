@@ -43,35 +43,26 @@ impl From<Fault> for Trouble {
 /// # Errors
 /// [`ConfigError`] with file, line and key.
 pub fn experiment(source: &Source) -> Result<Experiment, ConfigError> {
-    read(source, true, None)
+    read(source, None)
 }
 
-/// Reads an experiment of a robot whose `bodies` come from elsewhere, as [`export::bodies`](crate::export::bodies) reads them; a time step that is
-/// to be chosen is chosen for that robot.
+/// Reads an experiment of a robot whose `bodies` come from elsewhere, as [`export::bodies`](crate::export::bodies) reads them.
 ///
 /// # Errors
 /// As [`experiment()`].
 pub fn with_bodies(source: &Source, bodies: &[Segment]) -> Result<Experiment, ConfigError> {
-    read(source, true, Some(bodies))
+    read(source, Some(bodies))
 }
 
-/// Reads an experiment without the trial runs that `time_step_s = "auto"` asks for: to see whether it makes sense.
-///
-/// # Errors
-/// As [`experiment()`].
-pub fn check(source: &Source) -> Result<Experiment, ConfigError> {
-    read(source, false, None)
-}
-
-fn read(source: &Source, trials: bool, bodies: Option<&[Segment]>) -> Result<Experiment, ConfigError> {
+fn read(source: &Source, bodies: Option<&[Segment]>) -> Result<Experiment, ConfigError> {
     let config = source.parse()?;
-    resolve(&config, &source.folder, trials, bodies).map_err(|trouble| match trouble {
+    resolve(&config, &source.folder, bodies).map_err(|trouble| match trouble {
         Trouble::Fault(fault) => source.locate(fault),
         Trouble::Config(error) => error,
     })
 }
 
-fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segment]>) -> Result<Experiment, Trouble> {
+fn resolve(config: &Config, folder: &Path, bodies: Option<&[Segment]>) -> Result<Experiment, Trouble> {
     let mut robot = robot(config)?;
     let effects = effects(config)?;
     if let Some(joints) = effects::joints(&effects) {
@@ -111,7 +102,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segmen
         if engine == EngineKind::Bullet {
             return Err(Fault::new("simulation.time_step_s", "auto needs engine = \"planar\"").into());
         }
-        return auto::choose(config, &robot, trials, |config| resolve(config, folder, trials, bodies));
+        return auto::resolve(config, |config| resolve(config, folder, bodies));
     }
     for (key, given) in [("step_error", s.step_error.is_some()), ("step_measure", s.step_measure.is_some())] {
         if given {
@@ -133,6 +124,7 @@ fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segmen
         robot,
         drive,
         time_step,
+        accuracy: None,
         steps,
         record_every,
         record_from,
@@ -141,7 +133,6 @@ fn resolve(config: &Config, folder: &Path, trials: bool, bodies: Option<&[Segmen
         friction,
         numerical_damping: config.simulation.numerical_damping_per_s,
         effects,
-        step_choice: None,
         config: config.clone(),
     })
 }

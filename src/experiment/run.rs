@@ -1,7 +1,7 @@
 //! The loop over steps.
 
-use super::Experiment;
 use super::range::{self, Bending, CLEARLY};
+use super::{Experiment, StepChoice, auto};
 use crate::analytic;
 use crate::drive::{Means, Waveform};
 use crate::effects::View;
@@ -50,6 +50,8 @@ pub struct Run {
     pub energy: EnergyBalance,
     /// Whether the books of energy were kept: they know the plain model only.
     pub audited: bool,
+    /// How the steps were chosen, if they adapted.
+    pub step_choice: Option<StepChoice>,
 }
 
 impl Run {
@@ -94,33 +96,32 @@ impl Run {
 /// applied and the world steps. An engine that works at the middle of a step gets the step's mean voltages instead,
 /// or those of several parts of the step if it asks for them. Nothing is allocated inside the loop: the recording has its final size from the start.
 ///
+/// With an [`accuracy`](Experiment::accuracy) the steps adapt, the experiment's time step is that of its records only, and `observe` sees several
+/// runs, with ever tighter tolerances.
+///
 /// # Errors
 /// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
 pub fn run(
     experiment: &Experiment,
     engine: &mut dyn Engine,
-    mut observe: impl FnMut(u64) -> Control,
+    observe: impl FnMut(u64) -> Control,
 ) -> Result<Run, EngineError> {
-    let mut recorder = Recorder::new(experiment);
-    let mut books = experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step));
-    let mut voltages = vec![0.0; experiment.robot.actuators];
+    if let Some(accuracy) = &experiment.accuracy {
+        return auto::run(experiment, accuracy, engine, observe);
+    }
+    let mut observe = observe;
     let midpoint = engine.midpoint();
-    // A smooth drive needs no parts.
-    let parts = if matches!(experiment.drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
-    let mut pieces = vec![0.0; parts * experiment.robot.actuators];
+    let start = engine.step();
+    let mut done = start;
+    let every = sample_every(experiment);
+    let mut observation = Observation::new(experiment, start, every);
     let observe_every = (OBSERVE_EVERY_JOINTS / experiment.robot.joints().max(1) as u64).clamp(1, OBSERVE_EVERY);
-    let mut bending = Bending::default();
-    let view = View::new(&experiment.effects);
-    let origin = -0.5 * experiment.robot.segments()[0].length;
-    let mut interrupted = false;
-    let mut done = engine.step();
-    let start = done;
-    let (mut accumulator, every) = accumulator(experiment, start);
     let mut sampled = Every::new(start, every);
     let mut bent = Every::new(start, if midpoint { BEND_EVERY_SAMPLES * every } else { 1 });
     let mut observed = Every::new(start, observe_every);
     let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
-    let mut means = Means::new(&experiment.drive, experiment.robot.actuators, done as f64 * experiment.time_step);
+    let mut supply = Supply::new(experiment, engine, done as f64 * experiment.time_step);
+    let mut interrupted = false;
     while done < experiment.steps {
         if observed.comes(done) && observe(done) == Control::Stop {
             interrupted = true;
@@ -128,55 +129,159 @@ pub fn run(
         }
         let before = time;
         time = done as f64 * experiment.time_step;
-        if midpoint && parts > 1 {
-            let at = |part: usize| time + experiment.time_step * part as f64 / parts as f64;
-            for (part, piece) in pieces.chunks_exact_mut(experiment.robot.actuators).enumerate() {
-                means.over(at(part), at(part + 1), piece);
-            }
-            engine.prepare_parts(&pieces)?;
-        } else if midpoint {
-            let end = (done + 1) as f64 * experiment.time_step;
-            means.over(time, end, &mut voltages);
-            engine.prepare(&voltages)?;
+        if midpoint {
+            supply.prepare(engine, time, (done + 1) as f64 * experiment.time_step)?;
         } else {
-            experiment.drive.voltages(before, &mut voltages);
-            engine.prepare(&voltages)?;
+            supply.prepare_at(engine, before)?;
         }
-        if let Some(books) = &mut books {
-            books.take(engine)?;
+        if let Some(books) = &mut observation.books {
+            books.take(time, engine)?;
         }
         let last = done + 1 == experiment.steps;
         let regular = sampled.comes(done) || last;
-        if regular || accumulator.is_close() {
-            sample(&mut accumulator, time, regular, engine, (&view, origin))?;
+        if regular || observation.accumulator.is_close() {
+            observation.sample(time, regular, engine)?;
         }
         if experiment.records(done) {
-            recorder.record(time, engine)?;
+            observation.recorder.record(time, engine)?;
         }
         if bent.comes(done) || last {
-            bending.take(&engine.joints().angles, time);
+            observation.bending.take(&engine.joints().angles, time);
         }
         engine.advance()?;
         done += 1;
     }
-    let mut recording = recorder.recording;
-    recording.meta = experiment.meta(done, String::new());
-    see(&mut recording, &view, origin);
-    let energy = books.as_ref().map(Books::balance);
-    let mut measures = Measures { energy_error: energy.map(|energy| energy.error()), ..accumulator.measures() };
-    if measures.jump_height_mm.is_some() {
-        measures.recorded_jump_height_mm = Some(recorded_jump_height(&recording));
+    Ok(observation.finish(engine, done, interrupted))
+}
+
+/// The voltages of an experiment, for an engine that works at the middle of steps or one that works at their start.
+pub(super) struct Supply<'a> {
+    means: Means<'a>,
+    voltages: Vec<f64>,
+    /// Parts into which a step is cut for the engine, and their voltages.
+    parts: usize,
+    pieces: Vec<f64>,
+}
+
+impl<'a> Supply<'a> {
+    /// From the time `start` (s) on.
+    pub(super) fn new(experiment: &'a Experiment, engine: &dyn Engine, start: f64) -> Self {
+        let actuators = experiment.robot.actuators;
+        // A smooth drive needs no parts.
+        let parts = if matches!(experiment.drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
+        let means = Means::new(&experiment.drive, actuators, start);
+        Self { means, voltages: vec![0.0; actuators], parts, pieces: vec![0.0; parts * actuators] }
     }
-    Ok(Run {
-        recording,
-        measures,
-        interrupted,
-        clamp_hits: engine.clamp_hits(),
-        unstable: range::unstable(experiment, engine.hardening_curvature()),
-        audited: energy.is_some(),
-        bending,
-        energy: energy.unwrap_or_default(),
-    })
+
+    /// Gives the engine the voltages of a step from `from` to `to` (s), which begins where the one before ended.
+    fn prepare(&mut self, engine: &mut dyn Engine, from: f64, to: f64) -> Result<(), EngineError> {
+        if self.parts == 1 {
+            self.means.over(from, to, &mut self.voltages);
+            return engine.prepare(&self.voltages);
+        }
+        let at = |part: usize| from + (to - from) * part as f64 / self.parts as f64;
+        for (part, piece) in self.pieces.chunks_exact_mut(self.voltages.len()).enumerate() {
+            self.means.over(at(part), at(part + 1), piece);
+        }
+        engine.prepare_parts(&self.pieces)
+    }
+
+    /// Gives the engine the voltages of a step within which none jumps.
+    pub(super) fn prepare_smooth(&mut self, engine: &mut dyn Engine, from: f64, to: f64) -> Result<(), EngineError> {
+        let drive = self.means.drive();
+        if self.parts == 1 {
+            drive.mean_without_jump(from, to, &mut self.voltages);
+            return engine.prepare(&self.voltages);
+        }
+        let at = |part: usize| from + (to - from) * part as f64 / self.parts as f64;
+        for (part, piece) in self.pieces.chunks_exact_mut(self.voltages.len()).enumerate() {
+            drive.mean_without_jump(at(part), at(part + 1), piece);
+        }
+        engine.prepare_parts(&self.pieces)
+    }
+
+    /// Gives the engine the voltages of the time `t` (s).
+    fn prepare_at(&mut self, engine: &mut dyn Engine, t: f64) -> Result<(), EngineError> {
+        self.means.drive().voltages(t, &mut self.voltages);
+        engine.prepare(&self.voltages)
+    }
+}
+
+/// What is kept of a run while it goes on.
+pub(super) struct Observation<'a> {
+    experiment: &'a Experiment,
+    pub(super) recorder: Recorder,
+    pub(super) books: Option<Books>,
+    pub(super) accumulator: MeasureAccumulator,
+    pub(super) bending: Bending,
+    view: View,
+    /// x of the left end of the flat robot (cm).
+    origin: f64,
+}
+
+impl<'a> Observation<'a> {
+    /// Of a run from step `start` on, whose regular samples are `every` steps apart.
+    pub(super) fn new(experiment: &'a Experiment, start: u64, every: u64) -> Self {
+        Self {
+            recorder: Recorder::new(experiment),
+            books: experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step)),
+            accumulator: accumulator(experiment, start, every),
+            bending: Bending::default(),
+            view: View::new(&experiment.effects),
+            origin: -0.5 * experiment.robot.segments()[0].length,
+            experiment,
+        }
+    }
+
+    /// Shows the engine's robot at `time` (s) to the accumulator, as it is seen.
+    fn sample(&mut self, time: f64, regular: bool, engine: &mut dyn Engine) -> Result<(), EngineError> {
+        engine.places(self.accumulator.places())?;
+        self.take_sample(time, regular, engine.motor_voltages());
+        Ok(())
+    }
+
+    /// The same of the places that stand in the accumulator.
+    pub(super) fn take_sample(&mut self, time: f64, regular: bool, motor_voltages: &[f64]) {
+        self.accumulator.voltages(time, motor_voltages);
+        self.see();
+        if self.view.delay > 0.0 && self.accumulator.is_new() {
+            // Before the first state the robot stood as in it.
+            self.accumulator.take_standing(time);
+        }
+        self.accumulator.take(time + self.view.delay, regular);
+    }
+
+    /// Shows the nodes' places of `time` (s), which stand in the accumulator, as they are seen.
+    fn see(&mut self) {
+        if !self.view.is_plain() {
+            let (view, origin) = (&self.view, self.origin);
+            self.accumulator.places().iter_mut().for_each(|[x, z]| [*x, *z] = view.of([*x - origin, *z]));
+        }
+    }
+
+    /// The run, which ended after `done` steps.
+    pub(super) fn finish(self, engine: &dyn Engine, done: u64, interrupted: bool) -> Run {
+        let Self { experiment, recorder, books, accumulator, bending, view, origin } = self;
+        let mut recording = recorder.recording;
+        recording.meta = experiment.meta(done, String::new());
+        see(&mut recording, &view, origin);
+        let energy = books.as_ref().map(Books::balance);
+        let mut measures = Measures { energy_error: energy.map(|energy| energy.error()), ..accumulator.measures() };
+        if measures.jump_height_mm.is_some() {
+            measures.recorded_jump_height_mm = Some(recorded_jump_height(&recording));
+        }
+        Run {
+            recording,
+            measures,
+            interrupted,
+            clamp_hits: engine.clamp_hits(),
+            unstable: range::unstable(experiment, engine.hardening_curvature()),
+            audited: energy.is_some(),
+            bending,
+            energy: energy.unwrap_or_default(),
+            step_choice: None,
+        }
+    }
 }
 
 /// Steps at equal distances, told without a division in each step.
@@ -200,47 +305,27 @@ impl Every {
     }
 }
 
-/// What follows a run from step `start` on: the states before its steps, as a recording of all of them would hold them. And the number of
-/// steps from one regular sample to the next.
-fn accumulator(experiment: &Experiment, start: u64) -> (MeasureAccumulator, u64) {
-    let (robot, h) = (&experiment.robot, experiment.time_step);
-    let period = experiment.drive.period();
+/// Number of steps from one regular sample of the measures to the next.
+pub(super) fn sample_every(experiment: &Experiment) -> u64 {
+    let robot = &experiment.robot;
     let first_mode = analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2);
-    let spacing = period.unwrap_or(f64::INFINITY).min(1.0 / first_mode) / SAMPLES;
-    let every = (spacing / h).max(1.0) as u64;
+    let spacing = experiment.drive.period().unwrap_or(f64::INFINITY).min(1.0 / first_mode) / SAMPLES;
+    (spacing / experiment.time_step).max(1.0) as u64
+}
+
+/// What follows a run from step `start` on: the states before its steps, as a recording of all of them would hold them.
+fn accumulator(experiment: &Experiment, start: u64, every: u64) -> MeasureAccumulator {
+    let (robot, h) = (&experiment.robot, experiment.time_step);
     let last = experiment.steps.saturating_sub(1).max(start);
-    let plan = SamplingPlan {
+    MeasureAccumulator::new(SamplingPlan {
         mount: robot.mount,
         nodes: robot.joints() + 2,
-        period,
+        period: experiment.drive.period(),
         first: start as f64 * h,
         last: last as f64 * h,
         samples: ((last - start) / every + 2) as usize,
         spacing: if every > 1 { every as f64 * h } else { 0.0 },
-    };
-    (MeasureAccumulator::new(plan), every)
-}
-
-/// Shows the robot at `time` (s) to the accumulator, as it is seen.
-fn sample(
-    accumulator: &mut MeasureAccumulator,
-    time: f64,
-    regular: bool,
-    engine: &mut dyn Engine,
-    (view, origin): (&View, f64),
-) -> Result<(), EngineError> {
-    accumulator.voltages(time, engine.motor_voltages());
-    engine.places(accumulator.places())?;
-    if !view.is_plain() {
-        accumulator.places().iter_mut().for_each(|[x, z]| [*x, *z] = view.of([*x - origin, *z]));
-        if view.delay > 0.0 && accumulator.is_new() {
-            // Before the first state the robot stood as in it.
-            accumulator.take(time, true);
-            return sample(accumulator, time, regular, engine, (view, origin));
-        }
-    }
-    accumulator.take(time + view.delay, regular);
-    Ok(())
+    })
 }
 
 /// Turns the recorded places of the nodes into what is seen of them, scaled and rolled about the left end of the flat robot at x = `origin` (cm);
@@ -284,7 +369,7 @@ pub(crate) fn hermite(t: f64, ends: [f64; 2], [p0, v0]: [f64; 2], [p1, v1]: [f64
 }
 
 /// A recording that grows in memory set aside for it.
-struct Recorder {
+pub(super) struct Recorder {
     recording: Recording,
     nodes: usize,
 }
@@ -310,7 +395,7 @@ impl Recorder {
         Self { recording, nodes }
     }
 
-    fn record(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
+    pub(super) fn record(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
         let r = &mut self.recording;
         let state = engine.joints();
         r.time.push(time);

@@ -200,6 +200,12 @@ impl MeasureAccumulator {
         matches!(&self.kind, Kind::Mobile(mobile) if mobile.close)
     }
 
+    /// Takes the sample of `time` (s) without using up its [`places`](Self::places): those of the next one are the same.
+    pub fn take_standing(&mut self, time: f64) {
+        self.take(time, true);
+        self.now.clone_from(&self.before);
+    }
+
     /// Takes the sample of `time` (s), which is [`places`](Self::places): a `regular` one or one more near an extreme. Of the first sample
     /// after the end what lies on it is taken, and of later ones nothing.
     pub fn take(&mut self, mut time: f64, regular: bool) {

@@ -158,7 +158,7 @@ impl Sweep {
         }
         let mut sweep = Self { source, measures: file.measures, axes, files: BTreeMap::new() };
         for index in 0..sweep.len() {
-            for file in experiment::check(&sweep.source_of(index)?)?.config.files() {
+            for file in experiment::experiment(&sweep.source_of(index)?)?.config.files() {
                 let name = file.display().to_string();
                 if !sweep.files.contains_key(&name) {
                     sweep.files.insert(name, sweep.digest(file)?);

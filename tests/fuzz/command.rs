@@ -149,7 +149,7 @@ pub fn make(random: &mut Random) -> Input {
 /// Whether the command comes to an end soon: what is asked for decides about that, not the program.
 fn soon(input: &Input, folder: &Path) -> bool {
     let words: Vec<&str> = input.words.iter().map(String::as_str).collect();
-    let small = |source: &Source| match experiment::check(source) {
+    let small = |source: &Source| match experiment::experiment(source) {
         Err(_) => true,
         Ok(e) => !experiments::is_auto(&e) && e.steps as f64 * (4 + e.robot.joints()) as f64 <= WORK && e.robot.joints() <= 100,
     };

@@ -148,7 +148,7 @@ pub fn make_drive(random: &mut Random) -> Input {
 pub fn give_drive(input: &Input, folder: &Path, random: &mut Random) -> Outcome {
     input.write(folder)?;
     let source = Source::from_file(&folder.join("experiment.toml")).map_err(|error| error.to_string())?;
-    match experiment::check(&source) {
+    match experiment::experiment(&source) {
         Ok(experiment) => experiments::run(&experiment, random),
         Err(error) => refused(&error),
     }

@@ -195,7 +195,7 @@ pub fn give(input: &Input, folder: &Path, random: &mut Random) -> Outcome {
         Err(error) => return refused(&error),
     };
     source.folder = folder.into();
-    match experiment::check(&source) {
+    match experiment::experiment(&source) {
         Err(error) => refused(&error),
         Ok(checked) if is_auto(&checked) => {
             // The trials take as long as the beginning of the run; only short ones are made here.
@@ -308,7 +308,7 @@ fn saved(short: &Experiment, engine: &dyn Engine) -> Result<(), String> {
 /// Exports an experiment's robot; what is written has to be read again, with the same bodies.
 pub fn give_export(input: &Input, _: &Path, _: &mut Random) -> Outcome {
     let source = source(input)?;
-    let experiment = match experiment::check(&source) {
+    let experiment = match experiment::experiment(&source) {
         Ok(experiment) => experiment,
         Err(error) => return refused(&error),
     };

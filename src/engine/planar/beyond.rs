@@ -53,11 +53,6 @@ impl Beyond {
         if !extensions.bends_torque_law() && extensions.drag == 0.0 {
             return None;
         }
-        let ladder = LOSS_TIMES.map(|time| {
-            let gone = -(-step / time).exp_m1();
-            let mean = gone * time / step;
-            [1.0 - gone, time * gone, mean, time * (1.0 - mean)]
-        });
         let count = quads.len();
         let joint = quads.iter().enumerate().map(|(k, quad)| {
             // The root, in the first lane, has none.
@@ -68,7 +63,7 @@ impl Beyond {
             softening: extensions.softening / (link * link),
             friction: extensions.dry_friction,
             loss: extensions.loss,
-            ladder,
+            ladder: ladder(step),
             half_step: 0.5 * step,
             drag: 0.5 * AIR_DENSITY * extensions.drag * width,
             implicit: quads.iter().map(|quad| quad.implicit).collect(),
@@ -78,6 +73,14 @@ impl Beyond {
             turned_back: vec![[false; 4]; count],
             memory: vec![Default::default(); count],
         })
+    }
+
+    pub(super) fn set_time_step(&mut self, step: f64, quads: &[Quad]) {
+        self.half_step = 0.5 * step;
+        if self.loss != 0.0 {
+            self.ladder = ladder(step);
+        }
+        self.implicit.iter_mut().zip(quads).for_each(|(implicit, quad)| *implicit = quad.implicit);
     }
 
     pub(super) fn is_repeated(&self) -> bool {
@@ -225,4 +228,13 @@ impl Beyond {
             *slot = Lanes::new(*values);
         }
     }
+}
+
+/// What is left of each unit of the loss ladder's memory after a `step` (s), what a rate adds, and the means over the step of both.
+fn ladder(step: f64) -> [[f64; 4]; LOSS_TIMES.len()] {
+    LOSS_TIMES.map(|time| {
+        let gone = -(-step / time).exp_m1();
+        let mean = gone * time / step;
+        [1.0 - gone, time * gone, mean, time * (1.0 - mean)]
+    })
 }

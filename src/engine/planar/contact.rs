@@ -20,6 +20,8 @@ const LARGEST_CHANGE: f64 = 150.0;
 /// Share of a penetration that is pushed out per step, and the largest speed of it (cm/s): so slow that it makes no energy to speak of.
 const PUSH_OUT: f64 = 0.1;
 const PUSH_OUT_SPEED: f64 = 0.01;
+/// The same share per second at most, where steps differ in length.
+const FASTEST_PUSH_OUT: f64 = 1e3;
 
 /// Approach speed (cm/s) below which nothing bounces, as in Bullet.
 const LEAST_BOUNCE: f64 = 0.2;
@@ -30,6 +32,10 @@ pub(super) struct Law {
     time_step: f64,
     /// Steps per second.
     per_step: f64,
+    /// One over the time (s) from the middle of the step until when no corner may pass the floor.
+    per_ahead: f64,
+    /// Share of a penetration that is pushed out per second.
+    push_out: f64,
     /// Share of the step's end in the mean motion.
     weight: f64,
     /// 1/R (g).
@@ -44,19 +50,31 @@ impl Law {
         (self.time_step, LARGEST_CHANGE * self.time_step)
     }
 
+    /// Steps per second.
+    pub(super) fn per_step(&self) -> f64 {
+        self.per_step
+    }
+
+    /// As [`Engine::set_time_step`](crate::engine::Engine::set_time_step).
+    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: f64) {
+        (self.time_step, self.per_step, self.weight) = (time_step, 1.0 / time_step, weight);
+        self.per_ahead = 1.0 / (0.5 * time_step + ahead);
+        self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
+    }
+
     /// 1/R (g).
     pub(super) fn stiffness(&self) -> f64 {
         self.stiffness
     }
 
     pub(super) fn new(time_step: f64, weight: f64, body_mass: f64, friction: FrictionModel) -> Self {
-        Self { time_step, per_step: 1.0 / time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false, friction }
+        Self { time_step, per_step: 1.0 / time_step, per_ahead: 1.0 / time_step, push_out: PUSH_OUT / time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false, friction }
     }
 
     /// A frictionless floor for displacements: no velocity before, everything near.
     pub(super) fn statics(stiffness: f64) -> Self {
         let friction = FrictionModel::Convex;
-        Self { time_step: 1.0, per_step: 1.0, weight: 1.0, stiffness, frictionless: true, friction }
+        Self { time_step: 1.0, per_step: 1.0, per_ahead: 1.0, push_out: 0.0, weight: 1.0, stiffness, frictionless: true, friction }
     }
 }
 
@@ -177,11 +195,11 @@ impl Corners {
     #[inline(always)]
     pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
         let weight = f64x2::splat(law.weight);
-        let ahead = gap * f64x2::splat(-law.per_step);
+        let ahead = gap * f64x2::splat(-law.per_ahead);
         let end = if law.frictionless {
             ahead
         } else {
-            let out = (f64x2::splat(PUSH_OUT) * ahead).fast_min(f64x2::splat(PUSH_OUT_SPEED));
+            let out = (gap * f64x2::splat(-law.push_out)).fast_min(f64x2::splat(PUSH_OUT_SPEED));
             gap.simd_gt(f64x2::ZERO).select(ahead, out)
         };
         self.touch = self.touch(look - 1).of(near);
@@ -204,7 +222,7 @@ impl Corners {
         if restitution <= 0.0 {
             return;
         }
-        let reach = (gap + f64x2::splat(law.time_step) * speed).simd_le(f64x2::ZERO);
+        let reach = fma(gap, f64x2::splat(law.per_ahead), speed).simd_le(f64x2::ZERO);
         let fast = speed.simd_lt(f64x2::splat(-LEAST_BOUNCE));
         let bounced = speed + f64x2::splat(law.weight) * (f64x2::splat(-restitution) * speed - speed);
         self.target[1] = (reach & fast).select(bounced, self.target[1]);

@@ -6,7 +6,7 @@ use wide::f64x2;
 
 use super::LARGEST_FRICTION;
 use super::contact::{Corners, Grip, Law, Touch};
-use super::lanes::{fma, pair};
+use super::lanes::{Lanes, fma, pair};
 use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
@@ -99,6 +99,34 @@ impl Floor {
             moving = [next(moving[0], -rate * across[1], k), next(moving[1], rate * across[0], k)];
         }
         !self.near.is_empty()
+    }
+
+    /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor. The links point `along`, and the root's
+    /// reference point has this height (cm, as in [`find`](Self::find)) and velocity (cm/s).
+    #[inline(always)]
+    pub(super) fn landing(&self, quads: &[Quad], along: &[[Lanes; 2]], rungs: usize, [height, speed]: [f64; 2], least: f64) -> f64 {
+        let half = f64x2::splat(self.half_thickness);
+        let (least, never) = (f64x2::splat(-least), f64x2::splat(f64::INFINITY));
+        let mut at = f64x2::splat(height + self.half_thickness);
+        let mut moving = f64x2::splat(speed);
+        let mut first = never;
+        for k in 0..rungs {
+            let quad = &quads[k / 2];
+            let [x, z] = pair(&along[k / 2], k % 2);
+            let (rate, reach) = (quad.motion[0].rung(k % 2), quad.reach.rung(k % 2));
+            let there = quad.mass.rung(k % 2).simd_gt(f64x2::ZERO);
+            let corner = [half.copysign(x) * z, -half * x.abs()];
+            for along in [f64x2::ZERO, reach] {
+                let (arm_x, arm_z) = (fma(along, x, corner[0]), fma(along, z, corner[1]));
+                let down = fma(rate, arm_x, moving);
+                let time = (at + arm_z).fast_max(f64x2::ZERO) / -down;
+                first = first.fast_min((there & down.simd_lt(least)).select(time, never));
+            }
+            at = next(at, reach * z, k);
+            moving = next(moving, rate * reach * x, k);
+        }
+        let [a, b] = first.to_array();
+        a.min(b)
     }
 
     /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.

@@ -44,6 +44,11 @@ impl Lanes {
         Self(from_fn(|i| of(self.0[i])))
     }
 
+    /// Its numbers where those of `mask` are positive, and those of `other` elsewhere.
+    pub(super) fn where_positive(self, mask: Self, other: Self) -> Self {
+        Self(std::array::from_fn(|lane| if mask.0[lane] > 0.0 { self.0[lane] } else { other.0[lane] }))
+    }
+
     pub(super) fn abs(self) -> Self {
         self.map(f64::abs)
     }

@@ -126,6 +126,8 @@ pub struct PlanarEngine {
     asking: Vec<bool>,
     law: Law,
     weight: f64,
+    /// The weight is ½ + this (1/s) times the step.
+    numerical_damping: f64,
     /// Of the machine's registers.
     level: Level,
     step: u64,
@@ -135,8 +137,8 @@ pub struct PlanarEngine {
     voltages: Vec<f64>,
     /// Whether the state is known to be numbers, because the changes of the last step were.
     finite: bool,
-    /// Of all steps, for the books of energy.
-    turns: [f64; 2],
+    /// Of all steps, for the energy audit.
+    work_sums: [f64; 2],
     /// Newton iterations so far, of all steps.
     iterations: u64,
     /// Steps solved by pivoting.
@@ -173,8 +175,7 @@ impl PlanarEngine {
         let extensions = &robot.extensions;
         let bodies = robot.rigid_bodies();
         let mass: f64 = bodies.iter().map(|body| body.mass).sum();
-        let weight = (0.5 + damping * time_step).min(1.0);
-        let implicit = weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step);
+        let weight = weight_of(damping, time_step);
         let clamped = robot.mount == Mount::Clamped;
         let root = if clamped { 0 } else { count / 2 };
         let rungs = root.max(count - 1 - root) + 1;
@@ -190,7 +191,6 @@ impl PlanarEngine {
             at.middle.set_lane(lane, if i < root { 1.0 - bodies[i].middle } else { bodies[i].middle });
             at.reach.set_lane(lane, if i < root { -segment.length } else { segment.length });
             at.stiffness.set_lane(lane, joint.stiffness);
-            at.implicit.set_lane(lane, implicit);
             frictions[2 * quad + lane / 2][lane % 2] = (segment.friction * robot.friction.ground).min(LARGEST_FRICTION);
         }
         for quad in &mut quads {
@@ -211,10 +211,9 @@ impl PlanarEngine {
             _ => Hold::Free,
         };
         if hold == Hold::Hinged {
-            let stiffness = 1.0 / extensions.clamp_compliance;
-            quads[0].stiffness.set_lane(0, stiffness);
-            quads[0].implicit.set_lane(0, weight * time_step * stiffness * 0.5 * time_step);
+            quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
+        set_implicit(&mut quads, &joint, hold, weight, time_step);
         let m = robot.motors_per_actuator;
         let rest_angles =
             extensions.rest_curvature.iter().flat_map(|curvature| vec![curvature * robot.link_length(); m]).collect();
@@ -250,12 +249,13 @@ impl PlanarEngine {
             rungs,
             law: Law::new(time_step, weight, mass / count as f64, FrictionModel::default()),
             weight,
+            numerical_damping: damping,
             level: Level::new(),
             step: 0,
             state: JointState { angles: joints(), rates: joints(), torques: joints(), motor_voltages: joints() },
             voltages: Vec::with_capacity(robot.actuators),
             finite: false,
-            turns: [0.0; 2],
+            work_sums: [0.0; 2],
             iterations: 0,
             pivoted: 0,
             pivoting: Workspace::default(),
@@ -501,7 +501,8 @@ impl PlanarEngine {
                 self.velocity[k] = after;
             }
         }
-        self.turns = [0, 1].map(|k| self.turns[k] + Lanes::from(turns[k]).sum());
+        let [volts, squares] = turns.map(|turns| Lanes::from(turns).sum());
+        self.work_sums = [self.work_sums[0] + volts, self.work_sums[1] + squares * self.law.per_step()];
         self.step += 1;
         Ok(())
     }
@@ -539,6 +540,23 @@ impl PlanarEngine {
             bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
         let time = self.step as f64 * self.time_step;
         Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: None })
+    }
+}
+
+/// Weight of a step's end, of a step of `time_step` (s) with numerical damping (1/s).
+fn weight_of(damping: f64, time_step: f64) -> f64 {
+    (0.5 + damping * time_step).min(1.0)
+}
+
+/// Sets what springs and dampers add to the joints' inertia in a step of `time_step` (s).
+fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, hold: Hold, weight: f64, time_step: f64) {
+    let implicit = Lanes::splat(weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step));
+    for quad in quads.iter_mut() {
+        quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
+    }
+    if hold == Hold::Hinged {
+        let stiffness = quads[0].stiffness.lane(0);
+        quads[0].implicit.set_lane(0, weight * time_step * stiffness * 0.5 * time_step);
     }
 }
 
@@ -613,6 +631,10 @@ impl Engine for PlanarEngine {
         Ok(())
     }
 
+    fn landing(&mut self, least: f64) -> f64 {
+        if self.mount == Mount::Ground { dispatch!(self.level, simd => self.landing_here(simd, least)) } else { f64::INFINITY }
+    }
+
     fn motor_voltages(&self) -> &[f64] {
         &self.state.motor_voltages
     }
@@ -659,9 +681,10 @@ impl Engine for PlanarEngine {
         dispatch!(self.level, simd => self.advance_here(simd))
     }
 
-    fn turns(&self) -> [f64; 2] {
-        self.turns
+    fn work_sums(&self) -> [f64; 2] {
+        self.work_sums
     }
+
     fn midpoint(&self) -> bool {
         true
     }
@@ -680,6 +703,57 @@ impl Engine for PlanarEngine {
 
     fn numerical_loss(&self) -> f64 {
         self.numerical_loss
+    }
+
+    fn set_time_step(&mut self, time_step: f64, ahead: f64) -> Result<(), EngineError> {
+        self.weight = weight_of(self.numerical_damping, time_step);
+        self.law.set_time_step(time_step, self.weight, ahead);
+        if time_step.to_bits() == self.time_step.to_bits() {
+            return Ok(());
+        }
+        self.time_step = time_step;
+        set_implicit(&mut self.quads, &self.joint, self.hold, self.weight, time_step);
+        if let Some(beyond) = &mut self.beyond {
+            beyond.set_time_step(time_step, &self.quads);
+        }
+        Ok(())
+    }
+
+    fn set_step(&mut self, step: u64) {
+        self.step = step;
+    }
+
+    /// All lanes as they are, with the sums of energy.
+    fn checkpoint(&self, into: &mut Vec<f64>) -> Result<(), EngineError> {
+        for Quad { angle, posed, along: [x, z], motion: [a, b, c], .. } in &self.quads {
+            for lanes in [angle, posed, x, z, a, b, c] {
+                into.extend_from_slice(&lanes.to_array());
+            }
+        }
+        into.extend(self.centre.iter().chain(&self.velocity).chain(&self.work_sums));
+        into.push(self.numerical_loss);
+        into.extend(self.floor.saved());
+        into.extend(self.beyond.iter().flat_map(Beyond::saved));
+        Ok(())
+    }
+
+    fn rewind(&mut self, checkpoint: &[f64]) -> Result<(), EngineError> {
+        let (lanes, rest) = checkpoint.split_at(4 * 7 * self.quads.len());
+        let mut lanes = lanes.as_chunks().0.iter().map(|values| Lanes::new(*values));
+        for Quad { angle, posed, along: [x, z], motion: [a, b, c], .. } in &mut self.quads {
+            for to in [angle, posed, x, z, a, b, c] {
+                *to = lanes.next().ok_or(EngineError::State)?;
+            }
+        }
+        let [x, z, vx, vz, volts, squares, loss, ref rest @ ..] = *rest else { return Err(EngineError::State) };
+        let (corners, memory) = rest.split_at(self.floor.saved().count());
+        self.floor.restore(corners);
+        (self.centre, self.velocity, self.work_sums, self.numerical_loss) = ([x, z], [vx, vz], [volts, squares], loss);
+        if let Some(beyond) = &mut self.beyond {
+            beyond.restore(memory);
+        }
+        self.finite = true;
+        Ok(())
     }
 
     /// Angles of the bodies (rad, anticlockwise), then rate (rad/s) and velocity of the centre of mass (cm/s) of each, then centre of mass and

@@ -171,43 +171,46 @@ impl PlanarEngine {
                 w[(2 * count + 1) * (2 * j + direction)] += give;
             }
         }
-        // λ of all corners, then β₊, β₋ and γ.
-        let [normal, plus, minus, speed] = [0, 1, 2, 3].map(|block| block * count);
-        let n = 4 * count;
+        let friction = |i: usize| corners[i].friction;
+        // λ of all corners, then σ₊ and v₋.
+        let [normal, plus, speed] = [0, 1, 2].map(|block| block * count);
+        let n = 3 * count;
         cleared(matrix, n * n);
         cleared(right, n);
         for i in 0..count {
             for j in 0..count {
                 let [[tt, tn], [nt, nn]] = [0, 1].map(|a| [0, 1].map(|b| w[2 * count * (2 * i + a) + 2 * j + b]));
-                for (row, [on_normal, on_plus]) in [(normal, [nn, nt]), (plus, [tn, tt]), (minus, [-tn, -tt])] {
-                    for (column, value) in [(normal, on_normal), (plus, on_plus), (minus, -on_plus)] {
-                        matrix[n * (row + i) + column + j] = value;
-                    }
-                }
+                matrix[n * (normal + i) + normal + j] = nn - nt * friction(j);
+                matrix[n * (normal + i) + plus + j] = nt;
+                matrix[n * (plus + i) + normal + j] = tn - tt * friction(j);
+                matrix[n * (plus + i) + plus + j] = tt;
             }
-            for (row, column, value) in [
-                (plus, speed, 1.0),
-                (minus, speed, 1.0),
-                (speed, normal, corners[i].friction),
-                (speed, plus, -1.0),
-                (speed, minus, -1.0),
-            ] {
-                matrix[n * (row + i) + column + i] = value;
-            }
-            (right[normal + i], right[plus + i], right[minus + i]) = (free[i][1], free[i][0], -free[i][0]);
+            matrix[n * (plus + i) + speed + i] = 1.0;
+            matrix[n * (speed + i) + normal + i] = 2.0 * friction(i);
+            matrix[n * (speed + i) + plus + i] = -1.0;
+            (right[normal + i], right[plus + i]) = (free[i][1], free[i][0]);
         }
         if !lemke.solve(matrix, right) {
             return false;
         }
         let solution = &lemke.solution;
         let solved = |i: usize| {
-            let state = match (solution[normal + i] > 0.0, solution[speed + i] > 0.0) {
-                (false, _) => OPEN,
-                (true, false) => STICKS,
-                (true, true) if solution[plus + i] >= solution[minus + i] => PUSHED_FORWARD,
-                (true, true) => -PUSHED_FORWARD,
+            let (pressed, pushed, back) = (solution[normal + i], solution[plus + i], solution[speed + i]);
+            let most = friction(i) * pressed;
+            let state = if pressed <= 0.0 {
+                OPEN
+            } else if pushed <= 0.0 {
+                -PUSHED_FORWARD
+            } else if back > 0.0 || pushed >= 2.0 * most {
+                PUSHED_FORWARD
+            } else {
+                STICKS
             };
-            Solved { state, impulse: [solution[plus + i] - solution[minus + i], solution[normal + i]].map(|part| unit * part) }
+            let along = match state {
+                STICKS => pushed - most,
+                state => most.copysign(state) * f64::from(u8::from(state != OPEN)),
+            };
+            Solved { state, impulse: [along, pressed].map(|part| unit * part) }
         };
         into.clear();
         into.extend((0..count).map(solved));
@@ -224,94 +227,143 @@ fn cleared<T: Clone + Default>(vector: &mut Vec<T>, length: usize) {
 /// Lemke's method and its room.
 #[derive(Default)]
 struct Lemke {
+    /// Rows of the dictionary by `stride`, a multiple of [`WIDE`], without the end of each.
     rows: Vec<f64>,
+    stride: usize,
+    ends: Vec<f64>,
+    /// The entering column, and the leaving row by its entry there.
+    column: Vec<f64>,
     scaled: Vec<f64>,
+    ratios: Vec<f64>,
+    /// Variables of the rows and of the columns, and in which column each stands, or [`BASIC`].
     basic: Vec<usize>,
     others: Vec<usize>,
+    columns: Vec<usize>,
     solution: Vec<f64>,
 }
 
+const BASIC: usize = usize::MAX;
+/// Numbers that are computed at once.
+const WIDE: usize = 8;
+
 impl Lemke {
     /// Finds a solution z of 0 ≤ w = M z + q ⊥ z ≥ 0, with M by rows; whether there is one, or the path ends on a ray.
+    ///
+    /// Variables are w (0 to n), z (n to 2n) and z₀ (2n) with w = M z + z₀ + q. Each row: a basic one is the row's end less the row times the others.
     #[inline(always)]
     fn solve(&mut self, matrix: &[f64], right: &[f64]) -> bool {
-        self.find(matrix, right).is_some()
+        let n = right.len();
+        let largest = -right.iter().copied().fold(0.0, f64::min);
+        cleared(&mut self.solution, n);
+        if largest == 0.0 {
+            return true;
+        }
+        self.begin(matrix, right);
+        let artificial = 2 * n;
+        // All rows hold z₀, which enters first.
+        let mut entering = n;
+        self.column.fill(-1.0);
+        let mut leaving = (0..n).fold(0, |first, row| if self.before(row, first, |_| 1.0, &self.ends) { row } else { first });
+        for _ in 0..LARGEST_PIVOTS * n {
+            let left = self.exchange(leaving, entering);
+            // Other variables may reach zero together with the artificial one.
+            let row = self.basic.iter().position(|variable| *variable == artificial);
+            if row.is_none_or(|row| self.ends[row] <= DONE * largest) {
+                for (end, variable) in self.ends.iter().zip(&self.basic).filter(|(_, variable)| (n..artificial).contains(variable)) {
+                    self.solution[variable - n] = end.max(0.0);
+                }
+                return true;
+            }
+            let complement = if left < n { left + n } else { left - n };
+            entering = self.columns[complement];
+            let Some(first) = self.first_row(entering) else { return false };
+            leaving = first;
+        }
+        false
     }
 
     #[inline(always)]
-    fn find(&mut self, matrix: &[f64], right: &[f64]) -> Option<()> {
-        let Self { rows, scaled, basic, others, solution } = self;
+    fn begin(&mut self, matrix: &[f64], right: &[f64]) {
         let n = right.len();
-        let largest = -right.iter().copied().fold(0.0, f64::min);
-        cleared(solution, n);
-        if largest == 0.0 {
-            return Some(());
+        self.stride = (n + 1).next_multiple_of(WIDE);
+        cleared(&mut self.rows, n * self.stride);
+        for (row, from) in self.rows.chunks_exact_mut(self.stride).zip(matrix.chunks_exact(n)) {
+            row.iter_mut().zip(from).for_each(|(to, from)| *to = -from);
+            row[n] = -1.0;
         }
-        // Variables w (0 to n), z (n to 2n) and z₀ (2n) with w = M z + z₀ + q. Each row: a basic one is the row's end less the row times the others.
-        let (artificial, width) = (2 * n, n + 2);
-        cleared(rows, n * width);
-        for (i, row) in rows.chunks_exact_mut(width).enumerate() {
-            row[..n].iter_mut().zip(&matrix[n * i..]).for_each(|(to, from)| *to = -from);
-            (row[n], row[n + 1]) = (-1.0, right[i]);
-        }
-        basic.clear();
-        basic.extend(0..n);
-        others.clear();
-        others.extend(n..=2 * n);
-        cleared(scaled, width);
-        let (mut leaving, mut entering) = (first_row(rows, basic, others, |_| 1.0)?, n);
-        for _ in 0..LARGEST_PIVOTS * n {
-            let inverse = 1.0 / rows[width * leaving + entering];
-            scaled.iter_mut().zip(&rows[width * leaving..]).for_each(|(to, from)| *to = from * inverse);
-            for (i, row) in rows.chunks_exact_mut(width).enumerate() {
-                let factor = row[entering];
-                if i == leaving {
-                    row.copy_from_slice(scaled);
-                    row[entering] = inverse;
-                } else if factor != 0.0 {
-                    row.iter_mut().zip(&*scaled).for_each(|(to, from)| *to -= factor * from);
-                    row[entering] = -factor * inverse;
-                }
-            }
-            std::mem::swap(&mut basic[leaving], &mut others[entering]);
-            let value = |row: usize| rows[width * row + n + 1];
-            // Other variables may reach zero together with the artificial one.
-            if basic.iter().position(|variable| *variable == artificial).is_none_or(|row| value(row) <= DONE * largest) {
-                for (row, variable) in basic.iter().enumerate().filter(|(_, variable)| (n..artificial).contains(variable)) {
-                    solution[variable - n] = value(row).max(0.0);
-                }
-                return Some(());
-            }
-            // The complement of the variable that left.
-            let left = others[entering];
-            let next = if left < n { left + n } else { left - n };
-            entering = others.iter().position(|variable| *variable == next)?;
-            let entry = |row: usize| rows[width * row + entering];
-            let scale = (0..n).fold(0.0_f64, |scale, row| scale.max(entry(row).abs()));
-            leaving = first_row(rows, basic, others, |row| if entry(row) > ZERO * scale { entry(row) } else { 0.0 })?;
-        }
-        None
+        self.ends.clear();
+        self.ends.extend_from_slice(right);
+        self.basic.clear();
+        self.basic.extend(0..n);
+        self.others.clear();
+        self.others.extend(n..=2 * n);
+        self.columns.clear();
+        self.columns.extend((0..n).map(|_| BASIC).chain(0..=n));
+        cleared(&mut self.column, n);
+        cleared(&mut self.ratios, n);
+        cleared(&mut self.scaled, self.stride);
     }
-}
 
-/// Of the rows whose entry is not zero the one whose end per entry is least; where some are equal, whose row of the inverse basis per entry is
-/// first in lexicographic order.
-#[inline(always)]
-fn first_row(rows: &[f64], basic: &[usize], others: &[usize], entry: impl Fn(usize) -> f64) -> Option<usize> {
-    let n = basic.len();
-    // The inverse basis stands in the columns of w, those of basic ones being unit vectors.
-    let inverse = |row: usize, w: usize| {
-        let column = others.iter().position(|variable| *variable == w);
-        column.map_or_else(|| f64::from(u8::from(basic[row] == w)), |column| rows[(n + 2) * row + column])
-    };
-    let end = |row: usize| rows[(n + 2) * row + n + 1];
-    let before = |a: usize, b: usize| {
+    /// Exchanges the leaving row's basic variable, which is returned, for that of the entering column.
+    #[inline(always)]
+    fn exchange(&mut self, leaving: usize, entering: usize) -> usize {
+        let Self { rows, stride, ends, column, scaled, .. } = self;
+        let inverse = 1.0 / column[leaving];
+        let own = &mut rows[*stride * leaving..*stride * (leaving + 1)];
+        scaled.iter_mut().zip(&*own).for_each(|(to, from)| *to = from * inverse);
+        let end = ends[leaving] * inverse;
+        column[leaving] = 0.0;
+        for (row, factor) in rows.chunks_exact_mut(*stride).zip(&*column).filter(|(_, factor)| **factor != 0.0) {
+            row.iter_mut().zip(&*scaled).for_each(|(to, by)| *to -= factor * by);
+            row[entering] = -factor * inverse;
+        }
+        ends.iter_mut().zip(&*column).for_each(|(to, factor)| *to -= factor * end);
+        scaled[entering] = inverse;
+        rows[*stride * leaving..*stride * (leaving + 1)].copy_from_slice(scaled);
+        ends[leaving] = end;
+        let (left, entered) = (self.basic[leaving], self.others[entering]);
+        (self.basic[leaving], self.others[entering]) = (entered, left);
+        (self.columns[left], self.columns[entered]) = (entering, BASIC);
+        left
+    }
+
+    /// Loads the entering column and finds the row that reaches zero first; none if the variable can grow for ever.
+    #[inline(always)]
+    fn first_row(&mut self, entering: usize) -> Option<usize> {
+        for (to, row) in self.column.iter_mut().zip(self.rows.chunks_exact(self.stride)) {
+            *to = row[entering];
+        }
+        let zero = ZERO * self.column.iter().fold(0.0_f64, |scale, entry| if entry.abs() > scale { entry.abs() } else { scale });
+        for (ratio, (end, entry)) in self.ratios.iter_mut().zip(self.ends.iter().zip(&self.column)) {
+            *ratio = if *entry > zero { end / entry } else { f64::INFINITY };
+        }
+        let mut first = None;
+        for row in (0..self.ratios.len()).filter(|row| self.ratios[*row] < f64::INFINITY) {
+            if first.is_none_or(|first| self.before(row, first, |row| self.column[row], &self.ratios)) {
+                first = Some(row);
+            }
+        }
+        first
+    }
+
+    /// Whether row `a` reaches zero before row `b`; where both do at once, whose row of the inverse basis per entry is first in lexicographic order.
+    #[inline(always)]
+    fn before(&self, a: usize, b: usize, entry: impl Fn(usize) -> f64, ratios: &[f64]) -> bool {
+        let order = ratios[a].total_cmp(&ratios[b]);
+        if order.is_ne() {
+            return order.is_lt();
+        }
+        // The inverse basis stands in the columns of w, those of basic ones being unit vectors.
+        let inverse = |row: usize, w: usize| {
+            match self.columns[w] {
+                BASIC => f64::from(u8::from(self.basic[row] == w)),
+                column => self.rows[self.stride * row + column],
+            }
+        };
         let (by_a, by_b) = (entry(a), entry(b));
-        let order = (end(a) / by_a).total_cmp(&(end(b) / by_b));
-        let tied = || (0..n).map(|w| (inverse(a, w) / by_a).total_cmp(&(inverse(b, w) / by_b))).find(|order| order.is_ne());
-        if order.is_eq() { tied().is_some_and(|order| order.is_lt()) } else { order.is_lt() }
-    };
-    (0..n).filter(|row| entry(*row) != 0.0).reduce(|first, row| if before(row, first) { row } else { first })
+        let tied = (0..self.ends.len()).map(|w| (inverse(a, w) / by_a).total_cmp(&(inverse(b, w) / by_b)));
+        tied.into_iter().find(|order| order.is_ne()).is_some_and(|order| order.is_lt())
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,342 @@
+//! Steps that adapt to the motion, so that the error of each one stays below a tolerance.
+//!
+//! A step of length h is taken twice, whole and in two halves. The largest distance between the nodes of the two results is its local error, of
+//! third order in h where nothing happens; the halves are kept, and the next step is as long as the error says, up to 1 ms.
+//!
+//! The error of a corner that lands within a step is its velocity times h. So steps end where the next corner lands: the landing is foreseen from
+//! heights and velocities, again and again as it comes nearer, and then two very short steps of one length take the impact, the first half of the
+//! velocity and the second the other half, which ends exactly on the floor. Nothing may be left below it: what pushes a corner out interrupts
+//! its contact, and on films of high friction that has been seen to decide where a robot goes. Landings too slow to matter within a step are left
+//! to it, as are corners that begin to slide, stick or leave: their accelerations jump, which costs an error of second order that the control sees.
+//!
+//! Events may accumulate, as when a body rocks to rest. Each is slower than the one before, and those that would move nothing by the tolerance
+//! are not resolved; nor is what happens within 10⁻⁸ s.
+//!
+//! Steps also end where voltages jump and at multiples of the longest step, where a run can be saved. Records lie within steps: each is taken from
+//! a shorter step aside, so that they change nothing.
+//!
+//! E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I* (1993), II.4 (step size control); V. Acary, B. Brogliato,
+//! *Numerical Methods for Nonsmooth Dynamical Systems* (2008), chapter 8 (event-driven schemes and accumulations).
+
+use super::Experiment;
+use super::run::{Control, Observation, Run, Supply, sample_every};
+use crate::engine::{Engine, EngineError};
+use crate::model::Mount;
+
+/// The longest step (s).
+pub(super) const LONGEST: f64 = 1e-3;
+/// What happens within this time (s) happens at once: steps are not cut below it, but for those of an impact.
+const SHORTEST: f64 = 1e-8;
+/// The shortest step of an impact (s).
+const SHORTEST_IMPACT: f64 = 1e-10;
+/// Impacts that follow on each other at once; those after are left to ordinary steps. Seen: up to 12.
+const MOST_IMPACTS: u32 = 200;
+/// Share that is taken of the step that the error allows.
+const SAFETY: f64 = 0.9;
+/// Least and largest factor from one step to the next.
+const SHRINK: f64 = 0.2;
+const GROW: f64 = 4.0;
+/// A step that is to be shortened to more than this is halved: its first half is known then.
+const HALVED: f64 = 0.4;
+
+/// How many steps a run took, halves and rejected ones included, and the shortest and longest that were kept (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StepCount {
+    pub taken: u64,
+    pub shortest: f64,
+    pub longest: f64,
+}
+
+/// Why a run has no end.
+pub(super) enum Stopped {
+    Failed(EngineError),
+    /// It would have taken more steps than allowed.
+    TooLong,
+}
+
+impl From<EngineError> for Stopped {
+    fn from(error: EngineError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Runs an experiment from the engine's state on with steps of a local error of `tolerance` (cm) at most, of which at most `most` are taken.
+pub(super) fn run(
+    experiment: &Experiment,
+    tolerance: f64,
+    most: u64,
+    engine: &mut dyn Engine,
+    mut observe: impl FnMut(u64) -> Control,
+) -> Result<(Run, StepCount), Stopped> {
+    let grid = experiment.time_step;
+    let longest = (LONGEST / grid).round().max(1.0) as u64;
+    let mut done = engine.step();
+    let every = sample_every(experiment);
+    let mut run = AdaptiveRun {
+        observation: Observation::new(experiment, done, every),
+        supply: Supply::new(experiment, engine, done as f64 * grid),
+        experiment,
+        tolerance,
+        most,
+        count: StepCount { taken: 0, shortest: f64::INFINITY, longest: 0.0 },
+        impacts: 0,
+        every,
+        next_sample: done + every,
+        next_record: done + 1,
+        nodes: [(); 4].map(|()| vec![[0.0; 2]; experiment.robot.joints() + 2]),
+        checkpoints: Default::default(),
+    };
+    run.begin(engine, done)?;
+    let mut interrupted = false;
+    while done < experiment.steps {
+        if observe(done) == Control::Stop {
+            interrupted = true;
+            break;
+        }
+        let end = (done - done % longest + longest).min(experiment.steps);
+        run.advance(engine, done as f64 * grid, end as f64 * grid).map_err(|stopped| match stopped {
+            Stopped::Failed(error) => Stopped::Failed(error.at((done, done as f64 * grid))),
+            too_long @ Stopped::TooLong => too_long,
+        })?;
+        done = end;
+        engine.set_step(done);
+    }
+    Ok((run.observation.finish(engine, done, interrupted), run.count))
+}
+
+/// Places of the nodes at a step's start, at its end if it is taken whole, and at its middle and end if it is taken in two halves.
+const START: usize = 0;
+const WHOLE: usize = 1;
+const MIDDLE: usize = 2;
+const END: usize = 3;
+
+struct AdaptiveRun<'a> {
+    experiment: &'a Experiment,
+    tolerance: f64,
+    /// Steps that may be taken.
+    most: u64,
+    count: StepCount,
+    /// Impacts that have followed on each other at once.
+    impacts: u32,
+    observation: Observation<'a>,
+    supply: Supply<'a>,
+    /// In steps of the experiment: how far regular samples are apart and the next one; the next that may be recorded.
+    every: u64,
+    next_sample: u64,
+    next_record: u64,
+    nodes: [Vec<[f64; 2]>; 4],
+    /// Of the engine at a step's start, and at its end.
+    checkpoints: [Vec<f64>; 2],
+}
+
+/// A stretch of time (s) that a step or a part of one covers.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    from: f64,
+    length: f64,
+    /// Whether it ends where a corner lands, which it must reach freely.
+    lands: bool,
+}
+
+impl AdaptiveRun<'_> {
+    /// Takes in the state that the run begins with.
+    fn begin(&mut self, engine: &mut dyn Engine, step: u64) -> Result<(), EngineError> {
+        let time = step as f64 * self.experiment.time_step;
+        engine.places(&mut self.nodes[START])?;
+        engine.checkpoint(&mut self.checkpoints[0])?;
+        self.prepare_at(engine, time)?;
+        self.observation.accumulator.places().copy_from_slice(&self.nodes[START]);
+        self.observation.take_sample(time, true, engine.motor_voltages());
+        if let Some(books) = &mut self.observation.books {
+            books.take(time, engine)?;
+        }
+        if self.experiment.records(step) {
+            self.observation.recorder.record(time, engine)?;
+        }
+        engine.rewind(&self.checkpoints[0])
+    }
+
+    /// From `time` to `end` (s), beginning anew with the longest step.
+    fn advance(&mut self, engine: &mut dyn Engine, mut time: f64, end: f64) -> Result<(), Stopped> {
+        let mut wanted = end - time;
+        while time < end {
+            let until = self.experiment.drive.next_jump(time + SHORTEST).min(end);
+            let left = until - time;
+            // No sliver is left over.
+            let length = if wanted < left && left < 1.5 * wanted { 0.5 * left } else { wanted.min(left) };
+            let landing = engine.landing(self.tolerance / length);
+            if landing <= SHORTEST && landing < left && self.impacts < MOST_IMPACTS {
+                self.impacts += 1;
+                time += self.take_impact(engine, time, landing.max(SHORTEST_IMPACT).min(0.5 * left))?;
+                continue;
+            }
+            if landing > SHORTEST {
+                self.impacts = 0;
+            }
+            let lands = landing > SHORTEST && landing < length;
+            // What is left until the landing is an impact's first step.
+            let stretch = Stretch { from: time, length: if lands { landing - 0.5 * SHORTEST } else { length }, lands };
+            let (taken, next) = self.take_step(engine, stretch)?;
+            time = if !lands && taken == left { until } else { time + taken };
+            if !lands || taken < stretch.length {
+                wanted = next;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes two steps of `length` (s) each, in which corners come to rest on the floor; returns how long they are together.
+    fn take_impact(&mut self, engine: &mut dyn Engine, time: f64, length: f64) -> Result<f64, Stopped> {
+        self.keep_start(engine)?;
+        let half = Stretch { from: time, length, lands: false };
+        self.advance_by(engine, half)?;
+        engine.places(&mut self.nodes[MIDDLE])?;
+        self.advance_by(engine, Stretch { from: time + length, ..half })?;
+        engine.places(&mut self.nodes[END])?;
+        self.take_in(engine, Stretch { length: 2.0 * length, ..half })?;
+        Ok(2.0 * length)
+    }
+
+    /// Takes a step of that stretch or a shorter one; returns its length and that of the next one.
+    fn take_step(&mut self, engine: &mut dyn Engine, mut stretch: Stretch) -> Result<(f64, f64), Stopped> {
+        self.keep_start(engine)?;
+        let mut whole_is_known = false;
+        loop {
+            let shortest = stretch.length <= SHORTEST;
+            let error = match self.try_step(engine, stretch, whole_is_known) {
+                Err(Stopped::Failed(_)) if !shortest => f64::INFINITY,
+                error => error?,
+            };
+            let factor = SAFETY * (self.tolerance / error).cbrt();
+            if error <= self.tolerance || shortest {
+                self.count.shortest = self.count.shortest.min(stretch.length);
+                self.count.longest = self.count.longest.max(stretch.length);
+                self.take_in(engine, stretch)?;
+                return Ok((stretch.length, (stretch.length * factor.clamp(SHRINK, GROW)).max(SHORTEST)));
+            }
+            engine.rewind(&self.checkpoints[0])?;
+            whole_is_known = factor >= HALVED;
+            if whole_is_known {
+                self.nodes.swap(WHOLE, MIDDLE);
+            }
+            let shorter = if whole_is_known { 0.5 } else { factor.clamp(SHRINK, 0.5) };
+            stretch.length = if whole_is_known { 0.5 * stretch.length } else { (shorter * stretch.length).max(SHORTEST) };
+        }
+    }
+
+    fn keep_start(&mut self, engine: &mut dyn Engine) -> Result<(), EngineError> {
+        self.checkpoints[0].clear();
+        engine.checkpoint(&mut self.checkpoints[0])
+    }
+
+    /// Takes a step whole, unless that is known, and in halves; returns how far apart the results are (cm).
+    fn try_step(&mut self, engine: &mut dyn Engine, stretch: Stretch, whole_is_known: bool) -> Result<f64, Stopped> {
+        if !whole_is_known {
+            self.advance_by(engine, stretch)?;
+            engine.places(&mut self.nodes[WHOLE])?;
+            engine.rewind(&self.checkpoints[0])?;
+        }
+        let half = Stretch { length: 0.5 * stretch.length, ..stretch };
+        self.advance_by(engine, half)?;
+        engine.places(&mut self.nodes[MIDDLE])?;
+        self.advance_by(engine, Stretch { from: half.from + half.length, ..half })?;
+        engine.places(&mut self.nodes[END])?;
+        let apart = self.nodes[WHOLE].iter().zip(&self.nodes[END]).map(|(a, b)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs()));
+        // Of what is no number, too.
+        Ok(apart.fold(0.0, |most, apart| if apart <= most { most } else { apart.min(f64::INFINITY) }))
+    }
+
+    /// Moves the engine over a stretch in one step.
+    fn advance_by(&mut self, engine: &mut dyn Engine, Stretch { from, length, lands }: Stretch) -> Result<(), Stopped> {
+        if self.count.taken == self.most {
+            return Err(Stopped::TooLong);
+        }
+        self.count.taken += 1;
+        engine.set_time_step(length, if lands { 0.0 } else { 0.5 * length })?;
+        self.supply.prepare_smooth(engine, from, from + length)?;
+        Ok(engine.advance()?)
+    }
+
+    /// Gives the engine the voltages of the time `time` (s).
+    fn prepare_at(&mut self, engine: &mut dyn Engine, time: f64) -> Result<(), EngineError> {
+        engine.set_time_step(SHORTEST, SHORTEST)?;
+        self.supply.prepare_smooth(engine, time, time + SHORTEST)
+    }
+
+    /// Takes in what is to be seen after the start of a step that was just taken, until its end.
+    fn take_in(&mut self, engine: &mut dyn Engine, stretch: Stretch) -> Result<(), Stopped> {
+        let end = stretch.from + stretch.length;
+        let regular = self.sample(engine, stretch);
+        self.record(engine, stretch)?;
+        if regular {
+            self.observation.bending.take(&engine.joints().angles, end);
+        }
+        if let Some(books) = &mut self.observation.books {
+            books.take(end, engine)?;
+        }
+        self.nodes.swap(START, END);
+        Ok(())
+    }
+
+    /// Takes samples for the measures: regular ones from the parabola through start, middle and end, and, of a robot that moves about, the
+    /// middle and the end too, for extremes. Whether there were regular ones.
+    fn sample(&mut self, engine: &dyn Engine, Stretch { from, length, .. }: Stretch) -> bool {
+        let grid = self.experiment.time_step;
+        let extremes = self.experiment.robot.mount != Mount::Clamped;
+        let first = self.next_sample;
+        for (place, until) in [(MIDDLE, from + 0.5 * length), (END, from + length)] {
+            let mut last = f64::NAN;
+            while self.next_sample as f64 * grid <= until {
+                last = self.next_sample as f64 * grid;
+                let share = (last - from) / length;
+                let weights = [(1.0 - share) * (1.0 - 2.0 * share), 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)];
+                let nodes = [START, MIDDLE, END].map(|k| &self.nodes[k]);
+                for (i, to) in self.observation.accumulator.places().iter_mut().enumerate() {
+                    *to = [0, 1].map(|k| (0..3).map(|j| weights[j] * nodes[j][i][k]).sum());
+                }
+                self.observation.take_sample(last, true, engine.motor_voltages());
+                self.next_sample = self.after(self.next_sample);
+            }
+            if extremes && last != until {
+                self.observation.accumulator.places().copy_from_slice(&self.nodes[place]);
+                self.observation.take_sample(until, false, engine.motor_voltages());
+            }
+        }
+        self.next_sample > first
+    }
+
+    /// The regular sample after `sample`. The last is that of the last step.
+    fn after(&self, sample: u64) -> u64 {
+        let last = self.experiment.steps - 1;
+        if sample < last { (sample + self.every).min(last) } else { sample + self.every }
+    }
+
+    /// Records what falls into a step: of each record a shorter step to it is taken aside.
+    fn record(&mut self, engine: &mut dyn Engine, stretch: Stretch) -> Result<(), Stopped> {
+        let grid = self.experiment.time_step;
+        let (middle, end) = (stretch.from + 0.5 * stretch.length, stretch.from + stretch.length);
+        let mut aside = false;
+        while self.next_record < self.experiment.steps && self.next_record as f64 * grid <= end {
+            let at = self.next_record as f64 * grid;
+            if self.experiment.records(self.next_record) {
+                if !aside {
+                    aside = true;
+                    self.checkpoints[1].clear();
+                    engine.checkpoint(&mut self.checkpoints[1])?;
+                }
+                engine.rewind(&self.checkpoints[0])?;
+                let mut from = stretch.from;
+                for to in [middle.min(at), at] {
+                    if to > from {
+                        self.advance_by(engine, Stretch { from, length: to - from, lands: stretch.lands })?;
+                        from = to;
+                    }
+                }
+                self.prepare_at(engine, at)?;
+                self.observation.recorder.record(at, engine)?;
+            }
+            self.next_record += 1;
+        }
+        if aside { Ok(engine.rewind(&self.checkpoints[1])?) } else { Ok(()) }
+    }
+}
