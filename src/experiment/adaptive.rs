@@ -73,7 +73,7 @@ pub(super) fn run(
     let mut done = engine.step();
     let every = sample_every(experiment);
     let mut run = AdaptiveRun {
-        observation: Observation::new(experiment, done, every),
+        observation: Observation::new(experiment, done, every, experiment.steps),
         supply: Supply::new(experiment, engine, done as f64 * grid),
         experiment,
         tolerance,
@@ -188,12 +188,14 @@ impl AdaptiveRun<'_> {
     /// Takes two steps of `length` (s) each, in which corners come to rest on the floor; returns how long they are together.
     fn take_impact(&mut self, engine: &mut dyn Engine, time: f64, length: f64) -> Result<f64, Stopped> {
         self.keep_start(engine)?;
-        let half = Stretch { from: time, length, lands: false };
-        self.advance_by(engine, half)?;
-        engine.places(&mut self.nodes[MIDDLE])?;
-        self.advance_by(engine, Stretch { from: time + length, ..half })?;
+        let whole = Stretch { from: time, length: 2.0 * length, lands: false };
+        self.advance_by(engine, whole)?;
         engine.places(&mut self.nodes[END])?;
-        self.take_in(engine, Stretch { length: 2.0 * length, ..half })?;
+        let [start, _, middle, end] = &mut self.nodes;
+        for (to, (a, b)) in middle.iter_mut().zip(start.iter().zip(&*end)) {
+            *to = [0, 1].map(|k| 0.5 * (a[k] + b[k]));
+        }
+        self.take_in(engine, whole)?;
         Ok(2.0 * length)
     }
 
@@ -305,9 +307,9 @@ impl AdaptiveRun<'_> {
         self.next_sample > first
     }
 
-    /// The regular sample after `sample`. The last is that of the last step.
+    /// The regular sample after `sample`. The last is at the end.
     fn after(&self, sample: u64) -> u64 {
-        let last = self.experiment.steps - 1;
+        let last = self.experiment.steps;
         if sample < last { (sample + self.every).min(last) } else { sample + self.every }
     }
 

@@ -22,7 +22,7 @@ const GRID: f64 = 1e-4;
 const LOOSEST: f64 = 2e-6;
 const TIGHTER: f64 = 0.1;
 /// Runs with ever tighter tolerances.
-const RUNS: usize = 4;
+const RUNS: usize = 5;
 /// Steps of one run at most: this many, or those of so many per longest step if that is more.
 const MOST_STEPS: u64 = 2_000_000;
 const MOST_STEPS_OF_LONGEST: u64 = 500;

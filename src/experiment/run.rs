@@ -114,7 +114,8 @@ pub fn run(
     let start = engine.step();
     let mut done = start;
     let every = sample_every(experiment);
-    let mut observation = Observation::new(experiment, start, every);
+    let last = experiment.steps.saturating_sub(1).max(start);
+    let mut observation = Observation::new(experiment, start, every, last);
     let observe_every = (OBSERVE_EVERY_JOINTS / experiment.robot.joints().max(1) as u64).clamp(1, OBSERVE_EVERY);
     let mut sampled = Every::new(start, every);
     let mut bent = Every::new(start, if midpoint { BEND_EVERY_SAMPLES * every } else { 1 });
@@ -220,12 +221,12 @@ pub(super) struct Observation<'a> {
 }
 
 impl<'a> Observation<'a> {
-    /// Of a run from step `start` on, whose regular samples are `every` steps apart.
-    pub(super) fn new(experiment: &'a Experiment, start: u64, every: u64) -> Self {
+    /// Of a run from step `start` on, whose regular samples are `every` steps apart and end with step `last`.
+    pub(super) fn new(experiment: &'a Experiment, start: u64, every: u64, last: u64) -> Self {
         Self {
             recorder: Recorder::new(experiment),
             books: experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step)),
-            accumulator: accumulator(experiment, start, every),
+            accumulator: accumulator(experiment, start, every, last),
             bending: Bending::default(),
             view: View::new(&experiment.effects),
             origin: -0.5 * experiment.robot.segments()[0].length,
@@ -314,9 +315,8 @@ pub(super) fn sample_every(experiment: &Experiment) -> u64 {
 }
 
 /// What follows a run from step `start` on: the states before its steps, as a recording of all of them would hold them.
-fn accumulator(experiment: &Experiment, start: u64, every: u64) -> MeasureAccumulator {
+fn accumulator(experiment: &Experiment, start: u64, every: u64, last: u64) -> MeasureAccumulator {
     let (robot, h) = (&experiment.robot, experiment.time_step);
-    let last = experiment.steps.saturating_sub(1).max(start);
     MeasureAccumulator::new(SamplingPlan {
         mount: robot.mount,
         nodes: robot.joints() + 2,

@@ -8,7 +8,7 @@ use crate::diagnose::dataset::Description;
 use crate::drive::gait::GAITS;
 use crate::experiment::{
     Config, ConfigError, DriveConfig, EffectConfig, Experiment, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig,
-    SimulationConfig, Source, check,
+    SimulationConfig, Source,
 };
 use crate::sweep::Sweep;
 
@@ -88,7 +88,7 @@ fn with(base: &str, key: &str, value: &str) -> Result<Experiment, ConfigError> {
         source.set("simulation.time_step_s=auto").unwrap();
     }
     source.set(&format!("{key}={value}")).unwrap();
-    experiment::experiment(&source)
+    crate::experiment::experiment(&source)
 }
 
 fn same(a: &Experiment, b: &Experiment) -> bool {
@@ -286,7 +286,7 @@ fn what_a_key_goes_with_is_what_the_program_lets_it_go_with() {
             let bullet = &bases()[0].1;
             let mut source = Source::from_text("base", bullet.as_str());
             source.set(&format!("{name}={value}")).unwrap();
-            let refused = experiment::experiment(&source).err().map_or_else(String::new, |error| error.to_string());
+            let refused = crate::experiment::experiment(&source).err().map_or_else(String::new, |error| error.to_string());
             assert_eq!(refused.contains("belongs to"), !key.with.is_empty(), "{name}: {refused}");
             assert!(key.with.is_empty() || refused.contains(key.with), "{name}: {refused}");
         } else {
