@@ -414,11 +414,9 @@ fn the_planar_engine_chooses_its_step_starts_settled_and_is_judged_by_bullet() {
     };
     let chosen = run(&["--set", "simulation.time_step_s=auto", "--set", "simulation.step_error=0.01"]);
     let choice = &chosen["step_choice"];
-    for change in [&choice["change"], &choice["halvings"][0], &choice["halvings"][1], &choice["to_an_eighth"]] {
-        assert!(change.as_f64().unwrap() <= 0.01, "{chosen}");
-    }
-    assert!(choice["other_friction"].is_null(), "a clamped robot touches nothing: {chosen}");
-    assert_eq!(chosen["step_choice"]["time_step_s"], chosen["time_step_s"]);
+    assert!(choice["change"].as_f64().unwrap() <= 0.01, "{chosen}");
+    assert_eq!(choice["tolerance_cm"], choice["trials"].as_array().unwrap().last().unwrap()["tolerance_cm"], "{chosen}");
+    assert!(choice["longest_step_s"].as_f64().unwrap() < 1.001e-3, "{chosen}");
     let settled = run(&["--set", "simulation.start=settled"]);
     assert!(settled["energy"]["kinetic_erg"].as_f64().unwrap() < 1e-12, "{settled}");
     assert!((settled["measures"]["tip_deflection_mm"].as_f64().unwrap() + 18.987).abs() < 1e-3, "{settled}");
@@ -432,7 +430,7 @@ fn the_planar_engine_chooses_its_step_starts_settled_and_is_judged_by_bullet() {
     fs::write(bench.path("long.urdf"), &long.stdout).unwrap();
     let auto = ["--set", "simulation.time_step_s=auto", "--set", "simulation.step_error=0.01"];
     let chosen = run(&[&auto[..], &["--robot", "long.urdf"]].concat());
-    assert!(chosen["step_choice"]["trials"].as_array().unwrap().len() > 3, "{chosen}");
+    assert!(chosen["step_choice"]["trials"].as_array().unwrap().len() > 1, "{chosen}");
     assert_ne!(chosen["step_choice"]["trials"], run(&auto)["step_choice"]["trials"], "{chosen}");
 
     bench.refuses(&["run", "a.toml", "--engine", "plane"], 2, &["plane", "bullet, planar"]);

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use sfers::diagnose::dataset::Dataset;
-use sfers::experiment::{Source, check};
+use sfers::experiment::{self, Source};
 
 const README: &str = include_str!("../README.md");
 
@@ -61,7 +61,7 @@ fn every_command_of_the_readme_works_as_it_stands_in_an_empty_folder() {
 #[test]
 fn the_files_of_the_readme_are_accepted_as_they_stand() {
     let [experiment, dataset] = blocks("toml")[..] else { panic!("the README shows an experiment and a dataset") };
-    let experiment = check(&Source::from_text("README", experiment)).unwrap();
+    let experiment = experiment::experiment(&Source::from_text("README", experiment)).unwrap();
     assert_eq!(experiment.effects.len(), 1);
 
     let folder = tempfile::tempdir().unwrap();

@@ -281,7 +281,7 @@ pub trait Engine {
         Ok(())
     }
 
-    /// Goes back to a [`checkpoint`](Self::checkpoint) of this engine; the number of steps stays.
+    /// Goes back to a [`checkpoint`](Self::checkpoint) of this engine.
     ///
     /// # Errors
     /// Whatever the engine's library reports.

@@ -254,6 +254,11 @@ impl AdaptiveRun<'_> {
             return Err(Stopped::TooLong);
         }
         self.count.taken += 1;
+        self.advance_aside(engine, Stretch { from, length, lands })
+    }
+
+    /// The same without counting the step.
+    fn advance_aside(&mut self, engine: &mut dyn Engine, Stretch { from, length, lands }: Stretch) -> Result<(), Stopped> {
         engine.set_time_step(length, if lands { 0.0 } else { 0.5 * length })?;
         self.supply.prepare_smooth(engine, from, from + length)?;
         Ok(engine.advance()?)
@@ -330,7 +335,7 @@ impl AdaptiveRun<'_> {
                 let mut from = stretch.from;
                 for to in [middle.min(at), at] {
                     if to > from {
-                        self.advance_by(engine, Stretch { from, length: to - from, lands: stretch.lands })?;
+                        self.advance_aside(engine, Stretch { from, length: to - from, lands: stretch.lands })?;
                         from = to;
                     }
                 }

@@ -131,7 +131,7 @@ pub fn run(
         let before = time;
         time = done as f64 * experiment.time_step;
         if midpoint {
-            supply.prepare(engine, time, (done + 1) as f64 * experiment.time_step)?;
+            supply.prepare(engine, done, experiment.time_step)?;
         } else {
             supply.prepare_at(engine, before)?;
         }
@@ -174,13 +174,14 @@ impl<'a> Supply<'a> {
         Self { means, voltages: vec![0.0; actuators], parts, pieces: vec![0.0; parts * actuators] }
     }
 
-    /// Gives the engine the voltages of a step from `from` to `to` (s), which begins where the one before ended.
-    fn prepare(&mut self, engine: &mut dyn Engine, from: f64, to: f64) -> Result<(), EngineError> {
+    /// Gives the engine the voltages of a step of `time_step` (s), which begins where the one before ended.
+    fn prepare(&mut self, engine: &mut dyn Engine, step: u64, time_step: f64) -> Result<(), EngineError> {
+        let from = step as f64 * time_step;
         if self.parts == 1 {
-            self.means.over(from, to, &mut self.voltages);
+            self.means.over(from, (step + 1) as f64 * time_step, &mut self.voltages);
             return engine.prepare(&self.voltages);
         }
-        let at = |part: usize| from + (to - from) * part as f64 / self.parts as f64;
+        let at = |part: usize| from + time_step * part as f64 / self.parts as f64;
         for (part, piece) in self.pieces.chunks_exact_mut(self.voltages.len()).enumerate() {
             self.means.over(at(part), at(part + 1), piece);
         }

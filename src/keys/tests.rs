@@ -118,7 +118,7 @@ fn the_defaults_stated_are_the_programs() {
                 let mut changed_nothing = 0;
                 let silent = |base: &String| !base.lines().any(|line| line.starts_with(&format!("{} =", key.name)));
                 for base in bases().into_iter().map(|(_, base)| base).filter(silent) {
-                    let Ok(plain) = check(&Source::from_text("base", base.as_str())) else { panic!("{base}") };
+                    let Ok(plain) = crate::experiment::experiment(&Source::from_text("base", base.as_str())) else { panic!("{base}") };
                     if let Ok(given) = with(&base, &name, value) {
                         assert!(same(&plain, &given), "{name} = {value} is not the default");
                         changed_nothing += 1;
@@ -130,7 +130,7 @@ fn the_defaults_stated_are_the_programs() {
             Default::OfPreset(two, four) => {
                 for (preset, value) in [("parameter-2", two), ("parameter-4", four)] {
                     let base = format!("[material]\npreset = \"{preset}\"\n{}", bases()[0].1);
-                    let plain = serde_json::to_string(&check(&Source::from_text("base", base.as_str())).unwrap().spec()).unwrap();
+                    let plain = serde_json::to_string(&crate::experiment::experiment(&Source::from_text("base", base.as_str())).unwrap().spec()).unwrap();
                     let given = serde_json::to_string(&with(&base, &name, value).unwrap().spec()).unwrap();
                     // The constants are written in CGS units, so the last digit may differ.
                     let numbers = |text: &str| {
@@ -165,7 +165,7 @@ fn what_is_needed_is_missed_and_what_is_not_is_not() {
             if without.len() + 1 >= base.len() || without == base.trim_end() {
                 continue;
             }
-            let result = check(&Source::from_text("base", without));
+            let result = crate::experiment::experiment(&Source::from_text("base", without));
             if key.default == Default::Needed {
                 let error = result.unwrap_err().to_string();
                 assert!(error.contains(&name) && error.contains("is missing"), "{waveform}: {error}");

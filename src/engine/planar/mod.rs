@@ -731,7 +731,7 @@ impl Engine for PlanarEngine {
             }
         }
         into.extend(self.centre.iter().chain(&self.velocity).chain(&self.work_sums));
-        into.push(self.numerical_loss);
+        into.extend([self.numerical_loss, self.step as f64]);
         into.extend(self.floor.saved());
         into.extend(self.beyond.iter().flat_map(Beyond::saved));
         Ok(())
@@ -745,9 +745,10 @@ impl Engine for PlanarEngine {
                 *to = lanes.next().ok_or(EngineError::State)?;
             }
         }
-        let [x, z, vx, vz, volts, squares, loss, ref rest @ ..] = *rest else { return Err(EngineError::State) };
+        let [x, z, vx, vz, volts, squares, loss, step, ref rest @ ..] = *rest else { return Err(EngineError::State) };
         let (corners, memory) = rest.split_at(self.floor.saved().count());
         self.floor.restore(corners);
+        self.step = step as u64;
         (self.centre, self.velocity, self.work_sums, self.numerical_loss) = ([x, z], [vx, vz], [volts, squares], loss);
         if let Some(beyond) = &mut self.beyond {
             beyond.restore(memory);

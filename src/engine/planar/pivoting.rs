@@ -78,11 +78,14 @@ impl PlanarEngine {
             if room.corners.len() > LARGEST_PROBLEM {
                 break false;
             }
-            let pivoted = simd.vectorize(
-                #[inline(always)]
-                || self.pivot(&mut room, law),
-            );
-            if pivoted && self.push(&mut room, law) {
+            let mut is_solved_by = |form: Form| {
+                let pivoted = simd.vectorize(
+                    #[inline(always)]
+                    || self.pivot(&mut room, form, law),
+                );
+                pivoted && self.push(&mut room, law)
+            };
+            if is_solved_by(Form::Reduced) || is_solved_by(Form::Whole) {
                 if !self.floor.unsettle_changed(&self.quads, law) {
                     break true;
                 }
@@ -147,7 +150,7 @@ impl PlanarEngine {
 
     /// Finds a solution for the workspace's corners with all others in their states, and opens these corners; whether Lemke's method finds one.
     #[inline(always)]
-    fn pivot(&mut self, room: &mut Workspace, law: &Law) -> bool {
+    fn pivot(&mut self, room: &mut Workspace, form: Form, law: &Law) -> bool {
         let (rungs, among) = (0..self.rungs, self.floor.all());
         let Workspace { corners, solution: into, free, w, matrix, right, lemke, .. } = room;
         let count = corners.len();
@@ -175,18 +178,26 @@ impl PlanarEngine {
         }
         into.clear();
         let problem = Problem { w, free, corners, unit };
-        problem.load_reduced(matrix, right);
-        if lemke.solve(matrix, right) {
-            into.extend((0..count).map(|i| problem.read_reduced(&lemke.solution, i)));
-            return true;
+        match form {
+            Form::Reduced => problem.load_reduced(matrix, right),
+            Form::Whole => problem.load_whole(matrix, right),
         }
-        problem.load_whole(matrix, right);
         let solved = lemke.solve(matrix, right);
         if solved {
-            into.extend((0..count).map(|i| problem.read_whole(&lemke.solution, i)));
+            into.extend((0..count).map(|i| match form {
+                Form::Reduced => problem.read_reduced(&lemke.solution, i),
+                Form::Whole => problem.read_whole(&lemke.solution, i),
+            }));
         }
         solved
     }
+}
+
+/// How the problem is put: with three unknowns per corner, or with four, which is solved whenever there is a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Reduced,
+    Whole,
 }
 
 /// The complementarity problem of some corners, in units of a body's mass.
