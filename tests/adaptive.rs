@@ -39,7 +39,8 @@ fn mover(delay_s: f64, more: &[&str]) -> Experiment {
 /// Fixed steps of 2·10⁻⁷ s gave these; the delays of 20, 50 and 80 ms were not looked at when the tolerances were chosen.
 #[test]
 fn a_mover_on_rough_films_is_within_a_percent_of_very_short_steps_at_every_delay() {
-    let known = [(0.005, 1.9415), (0.02, 4.1339), (0.035, 5.1567), (0.05, 5.5042), (0.065, 6.5340), (0.08, 5.9055), (0.1, 5.5907)];
+    let known =
+        [(0.005, 1.9415), (0.02, 4.1339), (0.035, 5.1567), (0.05, 5.5042), (0.065, 6.5340), (0.08, 5.9055), (0.1, 5.5907)];
     for (delay_s, converged) in known {
         let found = run(&mover(delay_s, &[]));
         let choice = found.step_choice.unwrap();
@@ -133,19 +134,17 @@ fn what_cannot_be_promised_is_told() {
     let missing = preset("jump-14hz", &["simulation.step_measure=tip_deflection_mm", "simulation.duration_s=0.05"]);
     let told = try_run(&missing).unwrap_err();
     assert!(told.contains("simulation.step_measure") && told.contains("tip_deflection_mm"), "{told}");
-    let chaotic = preset("jump-14hz", &["simulation.step_measure=speed_mm_s", "simulation.step_error=1e-9", "simulation.duration_s=0.1"]);
+    let chaotic =
+        preset("jump-14hz", &["simulation.step_measure=speed_mm_s", "simulation.step_error=1e-9", "simulation.duration_s=0.1"]);
     let told = try_run(&chaotic).unwrap_err();
     assert!(told.contains("not converged to 1e-9") && told.contains("speed_mm_s") && told.contains(" cm "), "{told}");
 }
 
 #[test]
 fn extreme_friction_and_slopes_make_no_energy() {
-    for (low, high, more) in [
-        (1e6, 1e6, ""),
-        (0.0, 0.0, ""),
-        (0.0, 1e6, ""),
-        (0.3, 4.0, "[[effect]]\nid = \"ground-slope\"\nangle_deg = 25\n"),
-    ] {
+    for (low, high, more) in
+        [(1e6, 1e6, ""), (0.0, 0.0, ""), (0.0, 1e6, ""), (0.3, 4.0, "[[effect]]\nid = \"ground-slope\"\nangle_deg = 25\n")]
+    {
         let text = format!(
             "[robot]\nfriction = {{ low = {low}, high = {high} }}\n{more}[drive]\nwaveform = \"gait\"\ngait = \"full-frictional-inchworm\"\n\
              frequency_hz = 9\n[simulation]\nengine = \"planar\"\ntime_step_s = \"auto\"\nstep_error = 0.05\n\

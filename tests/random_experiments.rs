@@ -1,14 +1,14 @@
 //! `time_step_s = "auto"` on random experiments on the floor, against a tenth of the error.
 //!
 //! Six of them by default. `SFERS_RANDOM_EXPERIMENTS=200 cargo test --release --test random_experiments -- --nocapture` makes 200 and prints a line
-//! for each, which takes some minutes; `scripts/test.sh --hidden` does so too.
+//! for each, which takes two minutes; `scripts/test.sh --hidden` makes 200 too.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use sfers::experiment::{self, Control, Experiment, Source};
 
-/// Sets other numbers.
+/// Another gives other experiments.
 const SEED: u64 = 18;
 /// What is promised by default.
 const PROMISE: f64 = 1e-3;
@@ -54,7 +54,8 @@ fn random(case: usize) -> (String, &'static str) {
             .map(|_| (0..actuators).map(|_| ["0", "520", "-1500"][random.below(3)]).collect::<Vec<_>>().join(", "))
             .collect();
         let count = phases.len();
-        let phase = |(i, volts): (usize, String)| format!("{{ until = {:.4}, voltages_v = [{volts}] }}", (i + 1) as f64 / count as f64);
+        let phase =
+            |(i, volts): (usize, String)| format!("{{ until = {:.4}, voltages_v = [{volts}] }}", (i + 1) as f64 / count as f64);
         let phases: Vec<String> = phases.into_iter().enumerate().map(phase).collect();
         format!("waveform = \"sequence\"\nfrequency_hz = {frequency:.3}\nphases = [{}]", phases.join(", "))
     };
@@ -121,7 +122,8 @@ fn try_case(case: usize) -> (Outcome, String) {
 
 #[test]
 fn an_automatic_step_keeps_its_promise_on_robots_nobody_chose() {
-    let count: usize = std::env::var("SFERS_RANDOM_EXPERIMENTS").map_or(6, |count| count.parse().unwrap());
+    let by_default = if std::env::var("SFERS_LONG").is_ok_and(|long| long == "1") { 200 } else { 6 };
+    let count: usize = std::env::var("SFERS_RANDOM_EXPERIMENTS").map_or(by_default, |count| count.parse().unwrap());
     let next = AtomicUsize::new(0);
     let outcomes = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
@@ -146,7 +148,9 @@ fn an_automatic_step_keeps_its_promise_on_robots_nobody_chose() {
     let refused = of(|outcome| matches!(outcome, Outcome::Refused(_)));
     let chaotic = of(|outcome| matches!(outcome, Outcome::Refused(told) if told.contains("chaotic")));
     let unknown = of(|outcome| matches!(outcome, Outcome::Unknown));
-    println!("{count} experiments: {promised} promised, of which {kept} kept; {unknown} promised without a truth; {refused} refused, of which {chaotic} chaotic");
+    println!(
+        "{count} experiments: {promised} promised, of which {kept} kept; {unknown} promised without a truth; {refused} refused, of which {chaotic} chaotic"
+    );
     assert!(kept as f64 >= 0.95 * promised as f64, "{kept} of {promised}");
     // Refusing all would keep every promise.
     assert!(2 * promised > count, "{promised} of {count}");

@@ -87,7 +87,8 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
             }
             let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
             let text = read(path).map_err(|error| bad(error.to_string()))?;
-            let bodies = export::bodies(&text, &experiment::experiment(&source)?.robot).map_err(|error| bad(error.to_string()))?;
+            let bodies =
+                export::bodies(&text, &experiment::experiment(&source)?.robot).map_err(|error| bad(error.to_string()))?;
             experiment::with_bodies(&source, &bodies)?
         }
     };

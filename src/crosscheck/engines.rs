@@ -160,6 +160,7 @@ pub fn compare_engines(experiment: &Experiment, steps: [f64; 2]) -> Result<Engin
         (experiment.engine, experiment.time_step) = (engine, duration / RECORDS as f64 / every);
         (experiment.steps, experiment.record_every) = (RECORDS * every as u64, every as u64);
         experiment.record_from = experiment.record_every - 1;
+        experiment.accuracy = None;
         experiment
     };
     let swings = experiment.drive.period().is_some();

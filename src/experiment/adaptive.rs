@@ -4,10 +4,11 @@
 //! third order in h where nothing happens; the halves are kept, and the next step is as long as the error says, up to 1 ms.
 //!
 //! The error of a corner that lands within a step is its velocity times h. So steps end where the next corner lands: the landing is foreseen from
-//! heights and velocities, again and again as it comes nearer, and then two very short steps of one length take the impact, the first half of the
-//! velocity and the second the other half, which ends exactly on the floor. Nothing may be left below it: what pushes a corner out interrupts
-//! its contact, and on films of high friction that has been seen to decide where a robot goes. Landings too slow to matter within a step are left
-//! to it, as are corners that begin to slide, stick or leave: their accelerations jump, which costs an error of second order that the control sees.
+//! heights and velocities, again and again as it comes nearer, and then one very short step, twice as long as what is left, takes the impact at once
+//! (Moreau's law) and ends exactly on the floor. Where other corners touch, an impact in two stages would have another result, and nothing may be left
+//! below the floor: what pushes a corner out interrupts its contact, which on films of high friction has been seen to decide where a robot goes.
+//! Landings too slow to matter within a step are left to it, as are corners that begin to slide, stick or leave: their accelerations jump, which costs
+//! an error of second order that the control sees.
 //!
 //! Events may accumulate, as when a body rocks to rest. Each is slower than the one before, and those that would move nothing by the tolerance
 //! are not resolved; nor is what happens within 10⁻⁸ s.
@@ -27,9 +28,11 @@ use crate::model::Mount;
 pub(super) const LONGEST: f64 = 1e-3;
 /// What happens within this time (s) happens at once: steps are not cut below it, but for those of an impact.
 const SHORTEST: f64 = 1e-8;
-/// The shortest step of an impact (s).
+/// The shortest half of an impact's step (s).
 const SHORTEST_IMPACT: f64 = 1e-10;
-/// Impacts that follow on each other at once; those after are left to ordinary steps. Seen: up to 12.
+/// What rounding leaves of a stretch of time (s).
+const SLIVER: f64 = 1e-12;
+/// Impacts that follow on each other at once; those after are left to ordinary steps.
 const MOST_IMPACTS: u32 = 200;
 /// Share that is taken of the step that the error allows.
 const SAFETY: f64 = 0.9;
@@ -101,6 +104,7 @@ pub(super) fn run(
         done = end;
         engine.set_step(done);
     }
+    engine.set_time_step(grid, 0.5 * grid)?;
     Ok((run.observation.finish(engine, done, interrupted), run.count))
 }
 
@@ -162,6 +166,10 @@ impl AdaptiveRun<'_> {
         while time < end {
             let until = self.experiment.drive.next_jump(time + SHORTEST).min(end);
             let left = until - time;
+            if left < SLIVER {
+                time = until;
+                continue;
+            }
             // No sliver is left over.
             let length = if wanted < left && left < 1.5 * wanted { 0.5 * left } else { wanted.min(left) };
             let landing = engine.landing(self.tolerance / length);
@@ -174,7 +182,7 @@ impl AdaptiveRun<'_> {
                 self.impacts = 0;
             }
             let lands = landing > SHORTEST && landing < length;
-            // What is left until the landing is an impact's first step.
+            // What is left until the landing is half of an impact's step.
             let stretch = Stretch { from: time, length: if lands { landing - 0.5 * SHORTEST } else { length }, lands };
             let (taken, next) = self.take_step(engine, stretch)?;
             time = if !lands && taken == left { until } else { time + taken };
@@ -185,7 +193,7 @@ impl AdaptiveRun<'_> {
         Ok(())
     }
 
-    /// Takes two steps of `length` (s) each, in which corners come to rest on the floor; returns how long they are together.
+    /// Takes a step of twice `length` (s), in whose middle the next corner lands, and which stops it; returns how long it is.
     fn take_impact(&mut self, engine: &mut dyn Engine, time: f64, length: f64) -> Result<f64, Stopped> {
         self.keep_start(engine)?;
         let whole = Stretch { from: time, length: 2.0 * length, lands: false };

@@ -100,7 +100,8 @@ pub(super) fn resolve(config: &Config, resolve: impl Fn(&Config) -> Result<Exper
     (fixed.simulation.step_error, fixed.simulation.step_measure) = (None, None);
     let mut experiment = resolve(&fixed)?;
     if experiment.robot.mount == Mount::Ground && experiment.friction == FrictionModel::Convex {
-        let message = "convex does not go with time_step_s = \"auto\": its error depends on the step; give one in seconds, or take coulomb";
+        let message =
+            "convex does not go with time_step_s = \"auto\": its error depends on the step; give one in seconds, or take coulomb";
         return Err(Fault::new("simulation.friction", message).into());
     }
     if crate::effects::time_step_scale(&experiment.effects) != 1.0 {
@@ -222,7 +223,9 @@ impl<'a> Ladder<'a> {
             return Ok(Seen::Path(run.recording.positions.clone(), 3 * run.recording.nodes()));
         };
         run.measures.get(name).map(Seen::Value).ok_or_else(|| {
-            EngineError::NotResolved(format!("simulation.step_measure: {name} cannot be had from this experiment; take another or a longer run"))
+            EngineError::NotResolved(format!(
+                "simulation.step_measure: {name} cannot be had from this experiment; take another or a longer run"
+            ))
         })
     }
 

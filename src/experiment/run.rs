@@ -101,11 +101,7 @@ impl Run {
 ///
 /// # Errors
 /// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
-pub fn run(
-    experiment: &Experiment,
-    engine: &mut dyn Engine,
-    observe: impl FnMut(u64) -> Control,
-) -> Result<Run, EngineError> {
+pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut(u64) -> Control) -> Result<Run, EngineError> {
     if let Some(accuracy) = &experiment.accuracy {
         return auto::run(experiment, accuracy, engine, observe);
     }

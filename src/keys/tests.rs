@@ -118,7 +118,9 @@ fn the_defaults_stated_are_the_programs() {
                 let mut changed_nothing = 0;
                 let silent = |base: &String| !base.lines().any(|line| line.starts_with(&format!("{} =", key.name)));
                 for base in bases().into_iter().map(|(_, base)| base).filter(silent) {
-                    let Ok(plain) = crate::experiment::experiment(&Source::from_text("base", base.as_str())) else { panic!("{base}") };
+                    let Ok(plain) = crate::experiment::experiment(&Source::from_text("base", base.as_str())) else {
+                        panic!("{base}")
+                    };
                     if let Ok(given) = with(&base, &name, value) {
                         assert!(same(&plain, &given), "{name} = {value} is not the default");
                         changed_nothing += 1;
@@ -130,7 +132,10 @@ fn the_defaults_stated_are_the_programs() {
             Default::OfPreset(two, four) => {
                 for (preset, value) in [("parameter-2", two), ("parameter-4", four)] {
                     let base = format!("[material]\npreset = \"{preset}\"\n{}", bases()[0].1);
-                    let plain = serde_json::to_string(&crate::experiment::experiment(&Source::from_text("base", base.as_str())).unwrap().spec()).unwrap();
+                    let plain = serde_json::to_string(
+                        &crate::experiment::experiment(&Source::from_text("base", base.as_str())).unwrap().spec(),
+                    )
+                    .unwrap();
                     let given = serde_json::to_string(&with(&base, &name, value).unwrap().spec()).unwrap();
                     // The constants are written in CGS units, so the last digit may differ.
                     let numbers = |text: &str| {

@@ -68,13 +68,31 @@ impl Law {
     }
 
     pub(super) fn new(time_step: f64, weight: f64, body_mass: f64, friction: FrictionModel) -> Self {
-        Self { time_step, per_step: 1.0 / time_step, per_ahead: 1.0 / time_step, push_out: PUSH_OUT / time_step, weight, stiffness: body_mass / SOFTNESS, frictionless: false, friction }
+        Self {
+            time_step,
+            per_step: 1.0 / time_step,
+            per_ahead: 1.0 / time_step,
+            push_out: PUSH_OUT / time_step,
+            weight,
+            stiffness: body_mass / SOFTNESS,
+            frictionless: false,
+            friction,
+        }
     }
 
     /// A frictionless floor for displacements: no velocity before, everything near.
     pub(super) fn statics(stiffness: f64) -> Self {
         let friction = FrictionModel::Convex;
-        Self { time_step: 1.0, per_step: 1.0, per_ahead: 1.0, push_out: 0.0, weight: 1.0, stiffness, frictionless: true, friction }
+        Self {
+            time_step: 1.0,
+            per_step: 1.0,
+            per_ahead: 1.0,
+            push_out: 0.0,
+            weight: 1.0,
+            stiffness,
+            frictionless: true,
+            friction,
+        }
     }
 }
 

@@ -104,7 +104,14 @@ impl Floor {
     /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor. The links point `along`, and the root's
     /// reference point has this height (cm, as in [`find`](Self::find)) and velocity (cm/s).
     #[inline(always)]
-    pub(super) fn landing(&self, quads: &[Quad], along: &[[Lanes; 2]], rungs: usize, [height, speed]: [f64; 2], least: f64) -> f64 {
+    pub(super) fn landing(
+        &self,
+        quads: &[Quad],
+        along: &[[Lanes; 2]],
+        rungs: usize,
+        [height, speed]: [f64; 2],
+        least: f64,
+    ) -> f64 {
         let half = f64x2::splat(self.half_thickness);
         let (least, never) = (f64x2::splat(-least), f64x2::splat(f64::INFINITY));
         let mut at = f64x2::splat(height + self.half_thickness);

@@ -350,7 +350,9 @@ impl Lemke {
             // Other variables may reach zero together with the artificial one.
             let row = self.basic.iter().position(|variable| *variable == artificial);
             if row.is_none_or(|row| self.ends[row] <= DONE * largest) {
-                for (end, variable) in self.ends.iter().zip(&self.basic).filter(|(_, variable)| (n..artificial).contains(variable)) {
+                for (end, variable) in
+                    self.ends.iter().zip(&self.basic).filter(|(_, variable)| (n..artificial).contains(variable))
+                {
                     self.solution[variable - n] = end.max(0.0);
                 }
                 return true;
@@ -435,11 +437,9 @@ impl Lemke {
             return order.is_lt();
         }
         // The inverse basis stands in the columns of w, those of basic ones being unit vectors.
-        let inverse = |row: usize, w: usize| {
-            match self.columns[w] {
-                BASIC => f64::from(u8::from(self.basic[row] == w)),
-                column => self.rows[self.stride * row + column],
-            }
+        let inverse = |row: usize, w: usize| match self.columns[w] {
+            BASIC => f64::from(u8::from(self.basic[row] == w)),
+            column => self.rows[self.stride * row + column],
         };
         let (by_a, by_b) = (entry(a), entry(b));
         let tied = (0..self.ends.len()).map(|w| (inverse(a, w) / by_a).total_cmp(&(inverse(b, w) / by_b)));
