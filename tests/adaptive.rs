@@ -54,6 +54,34 @@ fn a_mover_on_rough_films_is_within_a_percent_of_very_short_steps_at_every_delay
     }
 }
 
+/// Against fixed steps of 5·10⁻⁶ s, where a robot jumps on friction 1 and where a clamped one swings.
+#[test]
+fn the_automatic_step_keeps_its_promise() {
+    for (name, measure, error) in [("jump-14hz", "jump_height_mm", 0.01), ("cantilever-step", "tip_amplitude_mm", 0.001)] {
+        let settings = [format!("simulation.step_error={error}"), format!("simulation.step_measure={measure}")];
+        let automatic = run(&preset(name, &["simulation.duration_s=0.2", &settings[0], &settings[1]]));
+        assert!(automatic.step_choice.as_ref().unwrap().change <= error);
+        let mut fixed = Source::from_text(name, presets::find(name).unwrap().text);
+        for setting in ["simulation.engine=planar", "simulation.time_step_s=5e-6", "simulation.duration_s=0.2"] {
+            fixed.set(setting).unwrap();
+        }
+        let fine = run(&experiment::experiment(&fixed).unwrap());
+        let (a, b) = (automatic.measures.get(measure).unwrap(), fine.measures.get(measure).unwrap());
+        assert!((a / b - 1.0).abs() < 2.0 * error, "{name}: {a} {b}");
+    }
+}
+
+/// With fixed steps from 10⁻³ to 6·10⁻⁵ s the sum of displacements stays at half of what it comes to: a loose promise is one, too.
+#[test]
+fn no_step_is_promised_on_a_false_plateau() {
+    for (delay_s, converged) in [(0.08, 5.9055), (0.065, 6.5340)] {
+        for error in [0.05, 0.02, 0.001] {
+            let found = run(&mover(delay_s, &[&format!("simulation.step_error={error}")])).measures.displacement_sum_mm.unwrap();
+            assert!((found / converged - 1.0).abs() < 2.0 * error, "{delay_s} {error}: {found}");
+        }
+    }
+}
+
 /// A flat robot without voltages on a slope α slides by ½ g (sin α − μ cos α) t² if that is steeper than the friction angle, and stays otherwise.
 #[test]
 fn a_robot_slides_down_a_slope_as_a_block_does() {

@@ -1,7 +1,7 @@
 //! `time_step_s = "auto"` on random experiments on the floor, against a tenth of the error.
 //!
 //! Six of them by default. `SFERS_RANDOM_EXPERIMENTS=200 cargo test --release --test random_experiments -- --nocapture` makes 200 and prints a line
-//! for each, which takes two minutes; `scripts/test.sh --hidden` makes 200 too.
+//! for each, which takes a minute; `scripts/test.sh --hidden` makes 200 too.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -111,7 +111,7 @@ impl Drive {
     }
 
     /// A time (s) up to which the voltages are those at `t`: their next jump, but for what rounding may move it by.
-    pub(crate) fn holds_until(&self, t: f64) -> f64 {
+    fn holds_until(&self, t: f64) -> f64 {
         let t = if self.delay == 0.0 { t } else { (t - self.delay).max(0.0) };
         let jump = match &self.waveform {
             Waveform::Gait { gait, parameter, .. } => gait.phase_end(t, *parameter),

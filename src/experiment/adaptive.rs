@@ -229,8 +229,8 @@ impl AdaptiveRun<'_> {
             if whole_is_known {
                 self.nodes.swap(WHOLE, MIDDLE);
             }
-            let shorter = if whole_is_known { 0.5 } else { factor.clamp(SHRINK, 0.5) };
-            stretch.length = if whole_is_known { 0.5 * stretch.length } else { (shorter * stretch.length).max(SHORTEST) };
+            stretch.length =
+                if whole_is_known { 0.5 * stretch.length } else { (factor.max(SHRINK) * stretch.length).max(SHORTEST) };
         }
     }
 
@@ -257,12 +257,12 @@ impl AdaptiveRun<'_> {
     }
 
     /// Moves the engine over a stretch in one step.
-    fn advance_by(&mut self, engine: &mut dyn Engine, Stretch { from, length, lands }: Stretch) -> Result<(), Stopped> {
+    fn advance_by(&mut self, engine: &mut dyn Engine, stretch: Stretch) -> Result<(), Stopped> {
         if self.count.taken == self.most {
             return Err(Stopped::TooLong);
         }
         self.count.taken += 1;
-        self.advance_aside(engine, Stretch { from, length, lands })
+        self.advance_aside(engine, stretch)
     }
 
     /// The same without counting the step.

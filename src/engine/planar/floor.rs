@@ -108,7 +108,7 @@ impl Floor {
         &self,
         quads: &[Quad],
         along: &[[Lanes; 2]],
-        rungs: usize,
+        levels: usize,
         [height, speed]: [f64; 2],
         least: f64,
     ) -> f64 {
@@ -117,7 +117,7 @@ impl Floor {
         let mut at = f64x2::splat(height + self.half_thickness);
         let mut moving = f64x2::splat(speed);
         let mut first = never;
-        for k in 0..rungs {
+        for k in 0..levels {
             let quad = &quads[k / 2];
             let [x, z] = pair(&along[k / 2], k % 2);
             let (rate, reach) = (quad.motion[0].rung(k % 2), quad.reach.rung(k % 2));
