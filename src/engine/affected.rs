@@ -112,7 +112,7 @@ impl Engine for AffectedEngine {
         self.engine.work_sums()
     }
 
-    fn set_time_step(&mut self, time_step: f64, ahead: f64) -> Result<(), EngineError> {
+    fn set_time_step(&mut self, time_step: f64, ahead: Option<f64>) -> Result<(), EngineError> {
         self.time_step = time_step;
         self.engine.set_time_step(time_step, ahead)
     }

@@ -260,12 +260,13 @@ pub trait Engine {
     /// If the numbers are not a state of this robot; nothing is changed then.
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError>;
 
-    /// Makes the coming steps `time_step` (s) long, in which no corner may come so low that it would be under the floor `ahead` (s) after the step.
+    /// Makes the coming steps `time_step` (s) long. With `ahead` they are not cut where corners land, and no corner may come so low that it would be
+    /// under the floor `ahead` (s) after the step.
     /// What is prepared is prepared for the old step.
     ///
     /// # Errors
     /// [`EngineError::FixedStep`] of an engine whose steps are all of one length.
-    fn set_time_step(&mut self, _time_step: f64, _ahead: f64) -> Result<(), EngineError> {
+    fn set_time_step(&mut self, _time_step: f64, _ahead: Option<f64>) -> Result<(), EngineError> {
         Err(EngineError::FixedStep)
     }
 

@@ -104,7 +104,7 @@ pub(super) fn run(
         done = end;
         engine.set_step(done);
     }
-    engine.set_time_step(grid, 0.5 * grid)?;
+    engine.set_time_step(grid, None)?;
     Ok((run.observation.finish(engine, done, interrupted), run.count))
 }
 
@@ -267,14 +267,14 @@ impl AdaptiveRun<'_> {
 
     /// The same without counting the step.
     fn advance_aside(&mut self, engine: &mut dyn Engine, Stretch { from, length, lands }: Stretch) -> Result<(), Stopped> {
-        engine.set_time_step(length, if lands { 0.0 } else { 0.5 * length })?;
+        engine.set_time_step(length, Some(if lands { 0.0 } else { 0.5 * length }))?;
         self.supply.prepare_smooth(engine, from, from + length)?;
         Ok(engine.advance()?)
     }
 
     /// Gives the engine the voltages of the time `time` (s).
     fn prepare_at(&mut self, engine: &mut dyn Engine, time: f64) -> Result<(), EngineError> {
-        engine.set_time_step(SHORTEST, SHORTEST)?;
+        engine.set_time_step(SHORTEST, Some(SHORTEST))?;
         self.supply.prepare_smooth(engine, time, time + SHORTEST)
     }
 

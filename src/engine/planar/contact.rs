@@ -34,8 +34,12 @@ pub(super) struct Law {
     per_step: f64,
     /// One over the time (s) from the middle of the step until when no corner may pass the floor.
     per_ahead: f64,
+    /// The same of corners that come down faster than [`landing_speed`](Self::landing_speed).
+    per_ahead_fast: f64,
     /// Share of a penetration that is pushed out per second.
     push_out: f64,
+    /// Corners that come down faster (cm/s) cut the step where they land.
+    pub(super) landing_speed: f64,
     /// Share of the step's end in the mean motion.
     weight: f64,
     /// 1/R (g).
@@ -55,10 +59,11 @@ impl Law {
         self.per_step
     }
 
-    /// As [`Engine::set_time_step`](crate::engine::Engine::set_time_step).
-    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: f64) {
+    /// Makes the coming steps `time_step` (s) long, with that weight of their ends, in which no corner comes so low that it would be under the floor
+    /// `ahead` (s) later, or, of those that come down fast, so much later as `ahead_fast` says.
+    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: f64, ahead_fast: f64) {
         (self.time_step, self.per_step, self.weight) = (time_step, 1.0 / time_step, weight);
-        self.per_ahead = 1.0 / (0.5 * time_step + ahead);
+        [self.per_ahead, self.per_ahead_fast] = [ahead, ahead_fast].map(|ahead| 1.0 / (0.5 * time_step + ahead));
         self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
     }
 
@@ -72,7 +77,9 @@ impl Law {
             time_step,
             per_step: 1.0 / time_step,
             per_ahead: 1.0 / time_step,
+            per_ahead_fast: 2.0 / time_step,
             push_out: PUSH_OUT / time_step,
+            landing_speed: f64::INFINITY,
             weight,
             stiffness: body_mass / SOFTNESS,
             frictionless: false,
@@ -87,7 +94,9 @@ impl Law {
             time_step: 1.0,
             per_step: 1.0,
             per_ahead: 1.0,
+            per_ahead_fast: 1.0,
             push_out: 0.0,
+            landing_speed: f64::INFINITY,
             weight: 1.0,
             stiffness,
             frictionless: true,
@@ -213,7 +222,8 @@ impl Corners {
     #[inline(always)]
     pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
         let weight = f64x2::splat(law.weight);
-        let ahead = gap * f64x2::splat(-law.per_ahead);
+        let fast = before[1].simd_lt(f64x2::splat(-law.landing_speed));
+        let ahead = gap * -fast.select(f64x2::splat(law.per_ahead_fast), f64x2::splat(law.per_ahead));
         let end = if law.frictionless {
             ahead
         } else {
@@ -257,11 +267,14 @@ impl Corners {
         if self.look == look { self.touch } else { Touch::default() }
     }
 
-    /// Arm (cm) and impulse of the floor over the step (dyn·s) of one of them, in the time of a look.
-    pub(super) fn of_body(&self, lane: usize, look: u64, law: &Law) -> [[f64; 2]; 2] {
-        let of = |part: f64x2| part.to_array()[lane];
-        let impulse = if self.look == look { self.impulse.map(of) } else { [0.0; 2] };
-        [self.arm.map(of), impulse.map(|part| part / law.weight)]
+    /// Arm of one of them (cm).
+    pub(super) fn arm(&self, lane: usize) -> [f64; 2] {
+        self.arm.map(|part| part.to_array()[lane])
+    }
+
+    /// Impulses of the floor on them over the step (dyn·s), in the time of a look.
+    pub(super) fn impulses(&self, look: u64, law: &Law) -> [f64x2; 2] {
+        if self.look == look { self.impulse.map(|part| part / f64x2::splat(law.weight)) } else { [f64x2::ZERO; 2] }
     }
 
     /// The law: states and impulses at the mean velocities `v`.

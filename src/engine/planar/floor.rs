@@ -25,6 +25,10 @@ pub(super) struct Floor {
     changing: Vec<usize>,
     /// How many times corners were looked for.
     looks: u64,
+    /// The first two landings of the step at hand (s from its start, not before it), as [`Law::landing_speed`] counts them; infinite where there are none.
+    landings: [f64; 2],
+    /// Impulses (dyn·s) of the parts of a step that was cut, of all corners; otherwise empty.
+    of_parts: Vec<[f64x2; 2]>,
 }
 
 /// Height of both reference points of a rung above the floor, with half a thickness (cm), their velocity (cm/s), the bodies' rates (rad/s), and
@@ -65,7 +69,17 @@ impl Floor {
         let grips: Vec<Grip> = frictions.iter().map(|pair| Grip::new(f64x2::new(*pair))).collect();
         let corners: Vec<Corners> = grips.iter().flat_map(|grip| [Corners::new(*grip); 2]).collect();
         let places = || Vec::with_capacity(corners.len());
-        Self { near: places(), changing: places(), corners, grips, surface, half_thickness, looks: 0 }
+        Self {
+            near: places(),
+            changing: places(),
+            of_parts: Vec::with_capacity(corners.len()),
+            corners,
+            grips,
+            surface,
+            half_thickness,
+            looks: 0,
+            landings: [f64::INFINITY; 2],
+        }
     }
 
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
@@ -74,6 +88,7 @@ impl Floor {
     pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, velocity: [f64; 2], law: &Law) -> bool {
         self.near.clear();
         self.looks += 1;
+        self.landings = [f64::INFINITY; 2];
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
@@ -151,6 +166,41 @@ impl Floor {
             self.feel_surface(place, gap, velocity, law);
         }
         self.near.push(place);
+        let comes = near & velocity[1].simd_lt(f64x2::splat(-law.landing_speed));
+        if comes.any() {
+            // The gap is that of the step's middle.
+            let time = gap / -velocity[1] + f64x2::splat(0.5 * law.reach().0);
+            let time = comes.select(time.fast_max(f64x2::ZERO), f64x2::splat(f64::INFINITY));
+            for time in time.to_array() {
+                let [first, second] = self.landings;
+                self.landings = [first.min(time), second.min(first.max(time))];
+            }
+        }
+    }
+
+    /// The first two landings of the step that corners were just looked for: see there.
+    pub(super) fn landings(&self) -> [f64; 2] {
+        self.landings
+    }
+
+    /// Begins a step that is cut.
+    pub(super) fn begin_parts(&mut self) {
+        self.of_parts.clear();
+        self.of_parts.resize(self.corners.len(), [f64x2::ZERO; 2]);
+    }
+
+    /// Begins a step that is not.
+    #[inline(always)]
+    pub(super) fn begin_whole(&mut self) {
+        self.of_parts.clear();
+    }
+
+    /// Adds the impulses of a part of the step.
+    pub(super) fn end_part(&mut self, law: &Law) {
+        for (sum, corners) in self.of_parts.iter_mut().zip(&self.corners) {
+            let impulses = corners.impulses(self.looks, law);
+            *sum = [0, 1].map(|k| sum[k] + impulses[k]);
+        }
     }
 
     /// Prepares corners for a floor that is not plain.
@@ -277,7 +327,12 @@ impl Floor {
 
     /// Arm (cm) and impulse (dyn·s) of the corners of one body: at its reference point and at its other end.
     pub(super) fn of_body(&self, rung: usize, lane: usize, law: &Law) -> [[[f64; 2]; 2]; 2] {
-        [0, 1].map(|end| self.corners[2 * rung + end].of_body(lane, self.looks, law))
+        [0, 1].map(|end| {
+            let place = 2 * rung + end;
+            let corners = &self.corners[place];
+            let impulses = self.of_parts.get(place).copied().unwrap_or_else(|| corners.impulses(self.looks, law));
+            [corners.arm(lane), impulses.map(|part| part.to_array()[lane])]
+        })
     }
 
     /// Sets friction to zero, or back to what it is.

@@ -44,6 +44,7 @@
 mod beyond;
 mod contact;
 mod floor;
+mod landing;
 mod lanes;
 mod newton;
 mod pivoting;
@@ -218,7 +219,7 @@ impl PlanarEngine {
         let rest_angles =
             extensions.rest_curvature.iter().flat_map(|curvature| vec![curvature * robot.link_length(); m]).collect();
         let joints = || vec![0.0; count - 1];
-        Ok(Self {
+        let mut engine = Self {
             joint,
             motors_per_actuator: robot.motors_per_actuator,
             mount: robot.mount,
@@ -260,7 +261,9 @@ impl PlanarEngine {
             pivoted: 0,
             pivoting: Workspace::default(),
             numerical_loss: 0.0,
-        })
+        };
+        engine.law.landing_speed = engine.landing_speed();
+        Ok(engine)
     }
 
     /// Contact problems' Newton iterations over all steps so far; 0 for steps without contact.
@@ -276,6 +279,7 @@ impl PlanarEngine {
     /// Chooses the law of friction.
     pub fn set_friction_model(&mut self, friction: FrictionModel) {
         self.law.friction = friction;
+        self.law.landing_speed = self.landing_speed();
     }
 
     /// Lets the floor rise by `angle` (rad) along +x: in its axes gravity is g (−sin, −cos). The books of energy know level floors only.
@@ -294,9 +298,10 @@ impl PlanarEngine {
     }
 
     /// Turns the links to where they are in the middle of the step if all goes on at its rates, and loads there what is known of the step's
-    /// right side: momenta, gravity, drag and the joints' torques for `share` (s).
+    /// right side: momenta, gravity, drag and the joints' torques. Finds the corners that may touch.
     #[inline(always)]
-    fn begin_step<S: Simd>(&mut self, simd: S, share: f64) {
+    fn begin_step<S: Simd>(&mut self, simd: S) {
+        let share = self.weight * self.time_step;
         let ahead = Four::splat(simd, 0.5 * self.time_step);
         let exact = self.step.is_multiple_of(EXACT_EVERY);
         let [pull_x, pull_z] = self.pull.map(|part| share * part);
@@ -316,6 +321,12 @@ impl PlanarEngine {
             }
             quad.load(momentum);
         }
+        if self.floor.is_viscous() {
+            let (height, _) = self.root_over_floor(simd);
+            self.floor.push_viscous(&mut self.quads, height, share);
+        }
+        let law = self.law;
+        self.find_corners(simd, &law);
     }
 
     /// Shows `look` the links as they stand now.
@@ -460,14 +471,22 @@ impl PlanarEngine {
     /// A step, in registers of this machine.
     #[inline(always)]
     fn advance_here<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
-        let h = self.time_step;
-        let share = self.weight * h;
-        self.begin_step(simd, share);
-        if self.floor.is_viscous() {
-            let (height, _) = self.root_over_floor(simd);
-            self.floor.push_viscous(&mut self.quads, height, share);
+        self.begin_step(simd);
+        self.floor.begin_whole();
+        if self.floor.landings()[0] < self.time_step {
+            self.advance_in_parts(simd)?;
+        } else {
+            self.end_step(simd)?;
         }
-        self.solve_step(simd, share)?;
+        self.step += 1;
+        Ok(())
+    }
+
+    /// Solves the step that was begun and takes it.
+    #[inline(always)]
+    fn end_step<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
+        let h = self.time_step;
+        self.solve_step(simd, self.weight * h)?;
         let [step, per_weight, zero] = [h, 1.0 / self.weight, 0.0].map(|value| Four::splat(simd, value));
         let (mut momentum, mut changed) = ([zero; 2], zero);
         let (mut before, mut turns) = (None, [zero; 2]);
@@ -503,7 +522,6 @@ impl PlanarEngine {
         }
         let [volts, squares] = turns.map(|turns| Lanes::from(turns).sum());
         self.work_sums = [self.work_sums[0] + volts, self.work_sums[1] + squares * self.law.per_step()];
-        self.step += 1;
         Ok(())
     }
 
@@ -705,17 +723,9 @@ impl Engine for PlanarEngine {
         self.numerical_loss
     }
 
-    fn set_time_step(&mut self, time_step: f64, ahead: f64) -> Result<(), EngineError> {
-        self.weight = weight_of(self.numerical_damping, time_step);
-        self.law.set_time_step(time_step, self.weight, ahead);
-        if time_step.to_bits() == self.time_step.to_bits() {
-            return Ok(());
-        }
-        self.time_step = time_step;
-        set_implicit(&mut self.quads, &self.joint, self.hold, self.weight, time_step);
-        if let Some(beyond) = &mut self.beyond {
-            beyond.set_time_step(time_step, &self.quads);
-        }
+    fn set_time_step(&mut self, time_step: f64, ahead: Option<f64>) -> Result<(), EngineError> {
+        self.set_length(time_step, ahead.map_or([0.5 * time_step, 0.0], |ahead| [ahead; 2]));
+        self.law.landing_speed = if ahead.is_none() { self.landing_speed() } else { f64::INFINITY };
         Ok(())
     }
 

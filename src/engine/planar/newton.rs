@@ -52,15 +52,20 @@ enum Search {
 }
 
 impl PlanarEngine {
-    /// Solves the step's mean motion, with the floor.
+    /// Finds the corners that may touch during the step; whether any does.
     #[inline(always)]
-    pub(super) fn solve_on_floor<S: Simd>(&mut self, simd: S, law: &Law) -> Result<(), EngineError> {
-        let near = self.mount == Mount::Ground && {
+    pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &Law) -> bool {
+        self.mount == Mount::Ground && {
             let (height, velocity) = self.root_over_floor(simd);
             self.floor.find(&self.quads, self.rungs, height, velocity, law)
-        };
+        }
+    }
+
+    /// Solves the step's mean motion, with the corners that were found.
+    #[inline(always)]
+    pub(super) fn solve_on_floor<S: Simd>(&mut self, simd: S, law: &Law) -> Result<(), EngineError> {
         let iterations = self.newton(simd, law)?;
-        if near {
+        if !self.floor.all().is_empty() {
             self.iterations += iterations;
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Where the nodes are, and when the next corner lands, at a small share of a step's cost.
+//! Where the nodes are, at a small share of a step's cost.
 
 use fearless_simd::{Simd, prelude::*};
 
@@ -37,21 +37,5 @@ impl PlanarEngine {
                 nodes[self.root + level + 1] = right;
             }
         }
-    }
-
-    /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor, if all go on as they move now.
-    #[inline(always)]
-    pub(super) fn landing_here<S: Simd>(&mut self, simd: S, least: f64) -> f64 {
-        let zero = Four::splat(simd, 0.0);
-        let (mut moment, mut speed) = (zero, zero);
-        for (quad, along) in self.quads.iter().zip(&mut self.kept) {
-            let [x, z] = quad.along_now(simd);
-            let lever = quad.lever.on(simd);
-            moment = fma(lever, z, moment);
-            speed = fma(lever * x, quad.motion[0].on(simd), speed);
-            *along = [x.into(), z.into()];
-        }
-        let height = self.centre[1] - Lanes::from(moment).sum();
-        self.floor.landing(&self.quads, &self.kept, self.rungs, [height, self.velocity[1] - Lanes::from(speed).sum()], least)
     }
 }

@@ -81,6 +81,7 @@ impl PlanarEngine {
                 }
                 before = last;
             }
+            self.find_corners(simd, &law);
             self.solve_on_floor(simd, &law)?;
             let turns = self.quads.iter().flat_map(|quad| quad.mean[0].to_array());
             let largest = turns.map(f64::abs).fold(0.0, f64::max);

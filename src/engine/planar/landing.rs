@@ -1,0 +1,117 @@
+//! Corners that land, and steps that are cut there.
+//!
+//! A step that a corner lands in would stop it by its end with what is left of the gap as look-ahead, and the next step would stop the rest: two stages
+//! of an impact, in shares that depend on where in the step it falls. Where other corners touch, plastic impacts with friction in one stage and in two
+//! have different results, so that finer steps would lead nowhere. Therefore a step ends a little before the first landing, and a part of the step
+//! of which the landing is the middle takes the impact at once (Moreau's law): the midpoint rule moves the corner by the mean of its velocities before
+//! and after, to the floor and not further. No other corner lands within that part, if they are not nearer than 10⁻⁹ s. Then the step goes on.
+//!
+//! Corners that come down slowly are left to the step, and after many landings, as of a body that rocks to rest, all others.
+//!
+//! J. J. Moreau, in *Nonsmooth Mechanics and Applications* (1988), on impacts; V. Acary, B. Brogliato, *Numerical Methods for Nonsmooth Dynamical
+//! Systems* (2008), chapter 8, on steps that end at events.
+
+use fearless_simd::{Simd, prelude::*};
+
+use super::lanes::{Four, Lanes, fma};
+use super::{EngineError, FrictionModel, PlanarEngine, set_implicit, weight_of};
+
+/// Corners that come down slower than with this acceleration (cm/s²) over a step do not cut it.
+const LEAST_ACCELERATION: f64 = 1e3;
+/// Landings that are nearer (s) are at once.
+const SHORTEST: f64 = 1e-9;
+/// Shortest half of an impact's part (s).
+const SHORTEST_IMPACT: f64 = 1e-10;
+/// Impacts in one step, after which it is cut no more.
+const MOST_IMPACTS: u32 = 32;
+/// Share of the longest part for an impact that a step is cut before the landing: the landing is foreseen from velocities and comes a little later or sooner.
+const BEFORE: f64 = 0.8;
+
+impl PlanarEngine {
+    /// The speed (cm/s) from which on landings cut steps of the engine's length.
+    pub(super) fn landing_speed(&self) -> f64 {
+        match self.law.friction {
+            FrictionModel::Coulomb => LEAST_ACCELERATION * self.time_step,
+            // An impact in a short step would be another than in a long one.
+            FrictionModel::Convex => f64::INFINITY,
+        }
+    }
+
+    /// Makes the coming steps so long (s), as [`Law::set_time_step`](super::contact::Law::set_time_step).
+    pub(super) fn set_length(&mut self, time_step: f64, [ahead, ahead_fast]: [f64; 2]) {
+        self.weight = weight_of(self.numerical_damping, time_step);
+        self.law.set_time_step(time_step, self.weight, ahead, ahead_fast);
+        if time_step.to_bits() == self.time_step.to_bits() {
+            return;
+        }
+        self.time_step = time_step;
+        set_implicit(&mut self.quads, &self.joint, self.hold, self.weight, time_step);
+        if let Some(beyond) = &mut self.beyond {
+            beyond.set_time_step(time_step, &self.quads);
+        }
+    }
+
+    /// Takes a step that was begun in parts. Out of line, for few steps come here.
+    #[inline(never)]
+    pub(super) fn advance_in_parts<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
+        let whole = self.time_step;
+        let result = simd.vectorize(
+            #[inline(always)]
+            || self.take_parts(simd),
+        );
+        self.set_length(whole, [0.5 * whole, 0.0]);
+        result
+    }
+
+    #[inline(always)]
+    fn take_parts<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
+        let (mut left, mut impacts) = (self.time_step, 0);
+        self.floor.begin_parts();
+        loop {
+            let [first, second] = self.floor.landings();
+            if first >= left || impacts == MOST_IMPACTS {
+                self.end_step(simd)?;
+                self.floor.end_part(&self.law);
+                return Ok(());
+            }
+            // What may lie on both sides of the landing.
+            let other = if second - first < SHORTEST { left } else { 0.5 * (second - first) };
+            let most = other.min(left - first).max(SHORTEST_IMPACT);
+            let length = if first <= most || first < SHORTEST {
+                impacts += 1;
+                let half = first.max(SHORTEST_IMPACT);
+                self.set_length((2.0 * half).min(left), [half; 2]);
+                2.0 * half
+            } else {
+                let length = first - BEFORE * most;
+                self.set_length(length, [0.5 * length, 0.0]);
+                length
+            };
+            self.begin_step(simd);
+            self.end_step(simd)?;
+            self.floor.end_part(&self.law);
+            left -= length;
+            if left < SHORTEST_IMPACT {
+                return Ok(());
+            }
+            self.set_length(left, [0.5 * left, 0.0]);
+            self.begin_step(simd);
+        }
+    }
+
+    /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor, if all go on as they move now.
+    #[inline(always)]
+    pub(super) fn landing_here<S: Simd>(&mut self, simd: S, least: f64) -> f64 {
+        let zero = Four::splat(simd, 0.0);
+        let (mut moment, mut speed) = (zero, zero);
+        for (quad, along) in self.quads.iter().zip(&mut self.kept) {
+            let [x, z] = quad.along_now(simd);
+            let lever = quad.lever.on(simd);
+            moment = fma(lever, z, moment);
+            speed = fma(lever * x, quad.motion[0].on(simd), speed);
+            *along = [x.into(), z.into()];
+        }
+        let height = self.centre[1] - Lanes::from(moment).sum();
+        self.floor.landing(&self.quads, &self.kept, self.rungs, [height, self.velocity[1] - Lanes::from(speed).sum()], least)
+    }
+}
