@@ -18,11 +18,11 @@
 //! D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth. Eng. 39 (1996); M. Anitescu and F. A. Potra, Nonlinear Dynamics 14 (1997); R. W. Cottle,
 //! J.-S. Pang and R. E. Stone, *The Linear Complementarity Problem* (1992), section 4.4; Ch. Glocker, *Set-Valued Force Laws* (2001), chapter 9.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, prelude::*};
 
 use super::PlanarEngine;
 use super::contact::{Law, OPEN, PUSHED_FORWARD, STICKS};
-use super::lanes::Lanes;
+use super::lanes::{Four, Lanes, fma};
 
 /// Pivots per unknown after which rounding must have led in circles. Seen: up to one per unknown.
 const LARGEST_PIVOTS: usize = 3;
@@ -81,7 +81,7 @@ impl PlanarEngine {
             let mut is_solved_by = |form: Form| {
                 let pivoted = simd.vectorize(
                     #[inline(always)]
-                    || self.pivot(&mut room, form, law),
+                    || self.pivot(simd, &mut room, form, law),
                 );
                 pivoted && self.push(&mut room, law)
             };
@@ -150,7 +150,7 @@ impl PlanarEngine {
 
     /// Finds a solution for the workspace's corners with all others in their states, and opens these corners; whether Lemke's method finds one.
     #[inline(always)]
-    fn pivot(&mut self, room: &mut Workspace, form: Form, law: &Law) -> bool {
+    fn pivot<S: Simd>(&mut self, simd: S, room: &mut Workspace, form: Form, law: &Law) -> bool {
         let (rungs, among) = (0..self.rungs, self.floor.all());
         let Workspace { corners, solution: into, free, w, matrix, right, lemke, .. } = room;
         let count = corners.len();
@@ -182,7 +182,7 @@ impl PlanarEngine {
             Form::Reduced => problem.load_reduced(matrix, right),
             Form::Whole => problem.load_whole(matrix, right),
         }
-        let solved = lemke.solve(matrix, right);
+        let solved = lemke.solve(simd, matrix, right);
         if solved {
             into.extend((0..count).map(|i| match form {
                 Form::Reduced => problem.read_reduced(&lemke.solution, i),
@@ -308,13 +308,13 @@ fn cleared<T: Clone + Default>(vector: &mut Vec<T>, length: usize) {
 /// Lemke's method and its room.
 #[derive(Default)]
 struct Lemke {
-    /// Rows of the dictionary by `stride`, a multiple of [`WIDE`], without the end of each.
-    rows: Vec<f64>,
-    stride: usize,
+    /// Rows of the dictionary, of so many wide parts each, without the end of each.
+    rows: Vec<Lanes>,
+    wide: usize,
     ends: Vec<f64>,
     /// The entering column, and the leaving row by its entry there.
     column: Vec<f64>,
-    scaled: Vec<f64>,
+    scaled: Vec<Lanes>,
     ratios: Vec<f64>,
     /// Variables of the rows and of the columns, and in which column each stands, or [`BASIC`].
     basic: Vec<usize>,
@@ -324,15 +324,15 @@ struct Lemke {
 }
 
 const BASIC: usize = usize::MAX;
-/// Numbers that are computed at once.
-const WIDE: usize = 8;
+/// Numbers of a part of a row.
+const WIDE: usize = 4;
 
 impl Lemke {
     /// Finds a solution z of 0 ≤ w = M z + q ⊥ z ≥ 0, with M by rows; whether there is one, or the path ends on a ray.
     ///
     /// Variables are w (0 to n), z (n to 2n) and z₀ (2n) with w = M z + z₀ + q. Each row: a basic one is the row's end less the row times the others.
     #[inline(always)]
-    fn solve(&mut self, matrix: &[f64], right: &[f64]) -> bool {
+    fn solve<S: Simd>(&mut self, simd: S, matrix: &[f64], right: &[f64]) -> bool {
         let n = right.len();
         let largest = -right.iter().copied().fold(0.0, f64::min);
         cleared(&mut self.solution, n);
@@ -346,7 +346,7 @@ impl Lemke {
         self.column.fill(-1.0);
         let mut leaving = (0..n).fold(0, |first, row| if self.before(row, first, |_| 1.0, &self.ends) { row } else { first });
         for _ in 0..LARGEST_PIVOTS * n {
-            let left = self.exchange(leaving, entering);
+            let left = self.exchange(simd, leaving, entering);
             // Other variables may reach zero together with the artificial one.
             let row = self.basic.iter().position(|variable| *variable == artificial);
             if row.is_none_or(|row| self.ends[row] <= DONE * largest) {
@@ -368,11 +368,13 @@ impl Lemke {
     #[inline(always)]
     fn begin(&mut self, matrix: &[f64], right: &[f64]) {
         let n = right.len();
-        self.stride = (n + 1).next_multiple_of(WIDE);
-        cleared(&mut self.rows, n * self.stride);
-        for (row, from) in self.rows.chunks_exact_mut(self.stride).zip(matrix.chunks_exact(n)) {
-            row.iter_mut().zip(from).for_each(|(to, from)| *to = -from);
-            row[n] = -1.0;
+        self.wide = (n + 1).div_ceil(WIDE);
+        cleared(&mut self.rows, n * self.wide);
+        for (row, from) in self.rows.chunks_exact_mut(self.wide).zip(matrix.chunks_exact(n)) {
+            for (to, from) in row.iter_mut().zip(from.chunks(WIDE)) {
+                *to = Lanes::new(std::array::from_fn(|lane| from.get(lane).map_or(0.0, |entry| -entry)));
+            }
+            row[n / WIDE].set_lane(n % WIDE, -1.0);
         }
         self.ends.clear();
         self.ends.extend_from_slice(right);
@@ -384,25 +386,32 @@ impl Lemke {
         self.columns.extend((0..n).map(|_| BASIC).chain(0..=n));
         cleared(&mut self.column, n);
         cleared(&mut self.ratios, n);
-        cleared(&mut self.scaled, self.stride);
+        cleared(&mut self.scaled, self.wide);
     }
 
     /// Exchanges the leaving row's basic variable, which is returned, for that of the entering column.
     #[inline(always)]
-    fn exchange(&mut self, leaving: usize, entering: usize) -> usize {
-        let Self { rows, stride, ends, column, scaled, .. } = self;
+    fn exchange<S: Simd>(&mut self, simd: S, leaving: usize, entering: usize) -> usize {
+        let Self { rows, wide, ends, column, scaled, .. } = self;
         let inverse = 1.0 / column[leaving];
-        let own = &mut rows[*stride * leaving..*stride * (leaving + 1)];
-        scaled.iter_mut().zip(&*own).for_each(|(to, from)| *to = from * inverse);
+        let own = *wide * leaving..*wide * (leaving + 1);
+        for (to, from) in scaled.iter_mut().zip(&rows[own.clone()]) {
+            *to = (from.on(simd) * inverse).into();
+        }
         let end = ends[leaving] * inverse;
         column[leaving] = 0.0;
-        for (row, factor) in rows.chunks_exact_mut(*stride).zip(&*column).filter(|(_, factor)| **factor != 0.0) {
-            row.iter_mut().zip(&*scaled).for_each(|(to, by)| *to -= factor * by);
-            row[entering] = -factor * inverse;
+        for ((row, factor), row_end) in rows.chunks_exact_mut(*wide).zip(&*column).zip(&mut *ends) {
+            if *factor != 0.0 {
+                let less = Four::splat(simd, -factor);
+                for (to, by) in row.iter_mut().zip(&*scaled) {
+                    *to = fma(less, by.on(simd), to.on(simd)).into();
+                }
+                row[entering / WIDE].set_lane(entering % WIDE, -factor * inverse);
+                *row_end -= factor * end;
+            }
         }
-        ends.iter_mut().zip(&*column).for_each(|(to, factor)| *to -= factor * end);
-        scaled[entering] = inverse;
-        rows[*stride * leaving..*stride * (leaving + 1)].copy_from_slice(scaled);
+        scaled[entering / WIDE].set_lane(entering % WIDE, inverse);
+        rows[own].copy_from_slice(scaled);
         ends[leaving] = end;
         let (left, entered) = (self.basic[leaving], self.others[entering]);
         (self.basic[leaving], self.others[entering]) = (entered, left);
@@ -413,8 +422,8 @@ impl Lemke {
     /// Loads the entering column and finds the row that reaches zero first; none if the variable can grow for ever.
     #[inline(always)]
     fn first_row(&mut self, entering: usize) -> Option<usize> {
-        for (to, row) in self.column.iter_mut().zip(self.rows.chunks_exact(self.stride)) {
-            *to = row[entering];
+        for (to, row) in self.column.iter_mut().zip(self.rows.chunks_exact(self.wide)) {
+            *to = row[entering / WIDE].lane(entering % WIDE);
         }
         let zero = ZERO * self.column.iter().fold(0.0_f64, |scale, entry| if entry.abs() > scale { entry.abs() } else { scale });
         for (ratio, (end, entry)) in self.ratios.iter_mut().zip(self.ends.iter().zip(&self.column)) {
@@ -439,7 +448,7 @@ impl Lemke {
         // The inverse basis stands in the columns of w, those of basic ones being unit vectors.
         let inverse = |row: usize, w: usize| match self.columns[w] {
             BASIC => f64::from(u8::from(self.basic[row] == w)),
-            column => self.rows[self.stride * row + column],
+            column => self.rows[self.wide * row + column / WIDE].lane(column % WIDE),
         };
         let (by_a, by_b) = (entry(a), entry(b));
         let tied = (0..self.ends.len()).map(|w| (inverse(a, w) / by_a).total_cmp(&(inverse(b, w) / by_b)));
@@ -449,11 +458,13 @@ impl Lemke {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
 
     fn lemke(matrix: &[f64], right: &[f64]) -> Option<Vec<f64>> {
         let mut method = Lemke::default();
-        method.solve(matrix, right).then_some(method.solution)
+        dispatch!(Level::new(), simd => method.solve(simd, matrix, right)).then_some(method.solution)
     }
 
     /// Contacts of a body that bends with a floor, some of them side by side: as in [`PlanarEngine::pivot`].
