@@ -42,8 +42,10 @@ fn random(case: usize) -> (String, &'static str) {
     let actuators = 1 + random.below(7);
     let motors = 1 + random.below(5);
     let film = ["both-ends", "right-end", "none"][random.below(3)];
-    // As large as fits under one end of the robot with the fewest segments.
-    let (low, high, fraction) = (random.scale(0.1, 5.0), random.scale(0.1, 5.0), 0.5 * random.share());
+    let (low, high) = (random.scale(0.1, 5.0), random.scale(0.1, 5.0));
+    // As large as fits at both ends of one actuator: a film covers ⌈m f + ½⌉ of its m + 1 segments.
+    let most = if actuators == 1 && motors % 2 == 0 { 0.5 - 0.5 / motors as f64 } else { 0.5 };
+    let fraction = most * random.share();
     let damping = random.scale(0.02, 0.1);
     let frequency = 2.0 + 16.0 * random.share();
     let drive = if actuators == 5 && random.below(2) == 0 {

@@ -20,11 +20,34 @@ const LARGEST_CHANGE: f64 = 150.0;
 /// Share of a penetration that is pushed out per step, and the largest speed of it (cm/s): so slow that it makes no energy to speak of.
 const PUSH_OUT: f64 = 0.1;
 const PUSH_OUT_SPEED: f64 = 0.01;
+/// Penetrations below this (cm) stay: what is pushed out under the robot's weight gains energy.
+const LEAST_DEPTH: f64 = 1e-5;
+/// Landings slower than this share of the speed from which on they cut steps are left to the step in any case.
+const SLOW: f64 = 0.01;
 /// The same share per second at most, where steps differ in length.
 const FASTEST_PUSH_OUT: f64 = 1e3;
 
 /// Approach speed (cm/s) below which nothing bounces, as in Bullet.
 const LEAST_BOUNCE: f64 = 0.2;
+
+/// Landings that are nearer (s) are at once.
+pub(super) const AT_ONCE: f64 = 1e-8;
+
+/// How long (s) after a step no corner may pass the floor: those that come down slower than [`Law::landing_speed`], the others, and of these such as are
+/// about to land.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ahead {
+    pub(super) slow: f64,
+    pub(super) fast: f64,
+    pub(super) landing: f64,
+}
+
+impl Ahead {
+    /// The same for all.
+    pub(super) fn all(ahead: f64) -> Self {
+        Self { slow: ahead, fast: ahead, landing: ahead }
+    }
+}
 
 /// What all corners share.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +59,8 @@ pub(super) struct Law {
     per_ahead: f64,
     /// The same of corners that come down faster than [`landing_speed`](Self::landing_speed).
     per_ahead_fast: f64,
+    /// The same of those of them that are about to land.
+    per_ahead_landing: f64,
     /// Share of a penetration that is pushed out per second.
     push_out: f64,
     /// Corners that come down faster (cm/s) cut the step where they land.
@@ -59,12 +84,33 @@ impl Law {
         self.per_step
     }
 
-    /// Makes the coming steps `time_step` (s) long, with that weight of their ends, in which no corner comes so low that it would be under the floor
-    /// `ahead` (s) later, or, of those that come down fast, so much later as `ahead_fast` says.
-    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: f64, ahead_fast: f64) {
+    /// Makes the coming steps `time_step` (s) long, with that weight of their ends.
+    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: Ahead) {
         (self.time_step, self.per_step, self.weight) = (time_step, 1.0 / time_step, weight);
-        [self.per_ahead, self.per_ahead_fast] = [ahead, ahead_fast].map(|ahead| 1.0 / (0.5 * time_step + ahead));
+        let Ahead { slow, fast, landing } = ahead;
+        [self.per_ahead, self.per_ahead_fast, self.per_ahead_landing] =
+            [slow, fast, landing].map(|ahead| 1.0 / (0.5 * time_step + ahead));
         self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
+    }
+
+    /// Open corners with these gaps in the step's middle (cm) and velocities along z (cm/s), if they go on so, that cut the step where they land: those
+    /// that come fast, and of others those that would be below the floor before the look-ahead stops them.
+    #[inline(always)]
+    pub(super) fn cuts(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
+        let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
+        fast | (velocity.simd_lt(f64x2::splat(-SLOW * self.landing_speed)) & gap.simd_lt(f64x2::ZERO))
+    }
+
+    /// One over the look-ahead (1/s) of corners with these gaps (cm) and velocities along z (cm/s).
+    #[inline(always)]
+    fn per_ahead(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
+        let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
+        if !fast.any() {
+            return f64x2::splat(self.per_ahead);
+        }
+        let lands = fma(velocity, f64x2::splat(AT_ONCE), gap).simd_lt(f64x2::ZERO);
+        let of_fast = lands.select(f64x2::splat(self.per_ahead_landing), f64x2::splat(self.per_ahead_fast));
+        fast.select(of_fast, f64x2::splat(self.per_ahead))
     }
 
     /// 1/R (g).
@@ -77,7 +123,8 @@ impl Law {
             time_step,
             per_step: 1.0 / time_step,
             per_ahead: 1.0 / time_step,
-            per_ahead_fast: 2.0 / time_step,
+            per_ahead_fast: 1.0 / time_step,
+            per_ahead_landing: 1.0 / time_step,
             push_out: PUSH_OUT / time_step,
             landing_speed: f64::INFINITY,
             weight,
@@ -95,6 +142,7 @@ impl Law {
             per_step: 1.0,
             per_ahead: 1.0,
             per_ahead_fast: 1.0,
+            per_ahead_landing: 1.0,
             push_out: 0.0,
             landing_speed: f64::INFINITY,
             weight: 1.0,
@@ -222,12 +270,12 @@ impl Corners {
     #[inline(always)]
     pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
         let weight = f64x2::splat(law.weight);
-        let fast = before[1].simd_lt(f64x2::splat(-law.landing_speed));
-        let ahead = gap * -fast.select(f64x2::splat(law.per_ahead_fast), f64x2::splat(law.per_ahead));
+        let ahead = gap * -law.per_ahead(gap, before[1]);
         let end = if law.frictionless {
             ahead
         } else {
-            let out = (gap * f64x2::splat(-law.push_out)).fast_min(f64x2::splat(PUSH_OUT_SPEED));
+            let deep = (-gap - f64x2::splat(LEAST_DEPTH)).fast_max(f64x2::ZERO);
+            let out = (deep * f64x2::splat(law.push_out)).fast_min(f64x2::splat(PUSH_OUT_SPEED));
             gap.simd_gt(f64x2::ZERO).select(ahead, out)
         };
         self.touch = self.touch(look - 1).of(near);
@@ -250,7 +298,7 @@ impl Corners {
         if restitution <= 0.0 {
             return;
         }
-        let reach = fma(gap, f64x2::splat(law.per_ahead), speed).simd_le(f64x2::ZERO);
+        let reach = fma(gap, law.per_ahead(gap, speed), speed).simd_le(f64x2::ZERO);
         let fast = speed.simd_lt(f64x2::splat(-LEAST_BOUNCE));
         let bounced = speed + f64x2::splat(law.weight) * (f64x2::splat(-restitution) * speed - speed);
         self.target[1] = (reach & fast).select(bounced, self.target[1]);
@@ -262,14 +310,15 @@ impl Corners {
         self.touch.is_open()
     }
 
+    /// The mask of those that are open.
+    #[inline(always)]
+    pub(super) fn open(&self) -> f64x2 {
+        self.touch.0.simd_eq(f64x2::ZERO)
+    }
+
     /// The states, in the time of a look.
     pub(super) fn touch(&self, look: u64) -> Touch {
         if self.look == look { self.touch } else { Touch::default() }
-    }
-
-    /// Arm of one of them (cm).
-    pub(super) fn arm(&self, lane: usize) -> [f64; 2] {
-        self.arm.map(|part| part.to_array()[lane])
     }
 
     /// Impulses of the floor on them over the step (dyn·s), in the time of a look.

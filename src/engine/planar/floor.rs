@@ -25,8 +25,8 @@ pub(super) struct Floor {
     changing: Vec<usize>,
     /// How many times corners were looked for.
     looks: u64,
-    /// The first two landings of the step at hand (s from its start, not before it), as [`Law::landing_speed`] counts them; infinite where there are none.
-    landings: [f64; 2],
+    /// When corners land in the step at hand (s from its start), of those that cut it, in no order.
+    landings: Vec<f64>,
     /// Impulses (dyn·s) of the parts of a step that was cut, of all corners; otherwise empty.
     of_parts: Vec<[f64x2; 2]>,
 }
@@ -78,7 +78,7 @@ impl Floor {
             surface,
             half_thickness,
             looks: 0,
-            landings: [f64::INFINITY; 2],
+            landings: Vec::with_capacity(2 * frictions.len() * 2),
         }
     }
 
@@ -88,7 +88,7 @@ impl Floor {
     pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, velocity: [f64; 2], law: &Law) -> bool {
         self.near.clear();
         self.looks += 1;
-        self.landings = [f64::INFINITY; 2];
+        self.landings.clear();
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
@@ -166,21 +166,25 @@ impl Floor {
             self.feel_surface(place, gap, velocity, law);
         }
         self.near.push(place);
-        let comes = near & velocity[1].simd_lt(f64x2::splat(-law.landing_speed));
+        let comes = near & self.corners[place].open() & law.cuts(gap, velocity[1]);
         if comes.any() {
             // The gap is that of the step's middle.
             let time = gap / -velocity[1] + f64x2::splat(0.5 * law.reach().0);
             let time = comes.select(time.fast_max(f64x2::ZERO), f64x2::splat(f64::INFINITY));
-            for time in time.to_array() {
-                let [first, second] = self.landings;
-                self.landings = [first.min(time), second.min(first.max(time))];
-            }
+            self.landings.extend(time.to_array());
         }
     }
 
-    /// The first two landings of the step that corners were just looked for: see there.
-    pub(super) fn landings(&self) -> [f64; 2] {
-        self.landings
+    /// When the first corner lands in the step that corners were just looked for, and the first that does so by more than `apart` (s) later; infinite
+    /// where none does.
+    #[inline(always)]
+    pub(super) fn landings(&self, apart: f64) -> [f64; 2] {
+        if self.landings.is_empty() {
+            return [f64::INFINITY; 2];
+        }
+        let least = |times: &mut dyn Iterator<Item = &f64>| times.copied().fold(f64::INFINITY, f64::min);
+        let first = least(&mut self.landings.iter());
+        [first, least(&mut self.landings.iter().filter(|time| **time > first + apart))]
     }
 
     /// Begins a step that is cut.
@@ -325,14 +329,17 @@ impl Floor {
         })
     }
 
-    /// Arm (cm) and impulse (dyn·s) of the corners of one body: at its reference point and at its other end.
-    pub(super) fn of_body(&self, rung: usize, lane: usize, law: &Law) -> [[[f64; 2]; 2]; 2] {
-        [0, 1].map(|end| {
-            let place = 2 * rung + end;
-            let corners = &self.corners[place];
-            let impulses = self.of_parts.get(place).copied().unwrap_or_else(|| corners.impulses(self.looks, law));
-            [corners.arm(lane), impulses.map(|part| part.to_array()[lane])]
+    /// Impulses on the corners of one body over the step (dyn·s): at its reference point and at its other end.
+    pub(super) fn impulses_on(&self, level: usize, lane: usize, law: &Law) -> [[f64; 2]; 2] {
+        [2 * level, 2 * level + 1].map(|place| {
+            let of_parts = self.of_parts.get(place).copied();
+            of_parts.unwrap_or_else(|| self.corners[place].impulses(self.looks, law)).map(|part| part.to_array()[lane])
         })
+    }
+
+    /// Of the bodies' boxes (cm).
+    pub(super) fn half_thickness(&self) -> f64 {
+        self.half_thickness
     }
 
     /// Sets friction to zero, or back to what it is.

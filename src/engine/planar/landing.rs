@@ -4,7 +4,7 @@
 //! of an impact, in shares that depend on where in the step it falls. Where other corners touch, plastic impacts with friction in one stage and in two
 //! have different results, so that finer steps would lead nowhere. Therefore a step ends a little before the first landing, and a part of the step
 //! of which the landing is the middle takes the impact at once (Moreau's law): the midpoint rule moves the corner by the mean of its velocities before
-//! and after, to the floor and not further. No other corner lands within that part, if they are not nearer than 10⁻⁹ s. Then the step goes on.
+//! and after, to the floor and not further. No other corner lands within that part, if they are not nearer than 10⁻⁸ s. Then the step goes on.
 //!
 //! Corners that come down slowly are left to the step, and after many landings, as of a body that rocks to rest, all others.
 //!
@@ -13,19 +13,28 @@
 
 use fearless_simd::{Simd, prelude::*};
 
+use super::contact::{AT_ONCE, Ahead};
 use super::lanes::{Four, Lanes, fma};
 use super::{EngineError, FrictionModel, PlanarEngine, set_implicit, weight_of};
 
 /// Corners that come down slower than with this acceleration (cm/s²) over a step do not cut it.
-const LEAST_ACCELERATION: f64 = 1e3;
-/// Landings that are nearer (s) are at once.
-const SHORTEST: f64 = 1e-9;
-/// Shortest half of an impact's part (s).
+const LEAST_ACCELERATION: f64 = 1e5;
+/// Shortest and longest half of an impact's part (s). Over a longer one the arc that a corner describes would be seen.
 const SHORTEST_IMPACT: f64 = 1e-10;
+const LONGEST_IMPACT: f64 = 1e-6;
 /// Impacts in one step, after which it is cut no more.
 const MOST_IMPACTS: u32 = 32;
+/// Look-ahead per square of the step (1/s) for corners that come fast: ω² r / (2 v) of a corner of the paper's robots that lands.
+const ARC: f64 = 100.0;
 /// Share of the longest part for an impact that a step is cut before the landing: the landing is foreseen from velocities and comes a little later or sooner.
 const BEFORE: f64 = 0.8;
+
+/// The look-ahead of a step of this length (s) that takes no impact. Those that come fast are to be stopped by their impacts only, but must not be below
+/// the floor before: of the step's square, for so their arcs are curved.
+pub(super) fn ahead(time_step: f64) -> Ahead {
+    let fast = ARC * time_step * time_step;
+    Ahead { slow: 0.5 * time_step, fast, landing: fast }
+}
 
 impl PlanarEngine {
     /// The speed (cm/s) from which on landings cut steps of the engine's length.
@@ -38,9 +47,9 @@ impl PlanarEngine {
     }
 
     /// Makes the coming steps so long (s), as [`Law::set_time_step`](super::contact::Law::set_time_step).
-    pub(super) fn set_length(&mut self, time_step: f64, [ahead, ahead_fast]: [f64; 2]) {
+    pub(super) fn set_length(&mut self, time_step: f64, ahead: Ahead) {
         self.weight = weight_of(self.numerical_damping, time_step);
-        self.law.set_time_step(time_step, self.weight, ahead, ahead_fast);
+        self.law.set_time_step(time_step, self.weight, ahead);
         if time_step.to_bits() == self.time_step.to_bits() {
             return;
         }
@@ -59,32 +68,33 @@ impl PlanarEngine {
             #[inline(always)]
             || self.take_parts(simd),
         );
-        self.set_length(whole, [0.5 * whole, 0.0]);
+        self.set_length(whole, ahead(whole));
         result
     }
 
     #[inline(always)]
     fn take_parts<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
-        let (mut left, mut impacts) = (self.time_step, 0);
+        let whole = self.time_step;
+        let (mut left, mut impacts) = (whole, 0);
         self.floor.begin_parts();
         loop {
-            let [first, second] = self.floor.landings();
+            let [first, second] = self.floor.landings(AT_ONCE);
             if first >= left || impacts == MOST_IMPACTS {
                 self.end_step(simd)?;
                 self.floor.end_part(&self.law);
                 return Ok(());
             }
             // What may lie on both sides of the landing.
-            let other = if second - first < SHORTEST { left } else { 0.5 * (second - first) };
-            let most = other.min(left - first).max(SHORTEST_IMPACT);
-            let length = if first <= most || first < SHORTEST {
+            let most = (0.5 * (second - first)).min(LONGEST_IMPACT).min(left - first).max(SHORTEST_IMPACT);
+            let length = if first <= most || first < AT_ONCE {
                 impacts += 1;
                 let half = first.max(SHORTEST_IMPACT);
-                self.set_length((2.0 * half).min(left), [half; 2]);
+                // Of those that land at once none is left with a speed of its own.
+                self.set_length((2.0 * half).min(left), Ahead { slow: half, fast: 0.0, landing: whole });
                 2.0 * half
             } else {
                 let length = first - BEFORE * most;
-                self.set_length(length, [0.5 * length, 0.0]);
+                self.set_length(length, ahead(length));
                 length
             };
             self.begin_step(simd);
@@ -94,7 +104,7 @@ impl PlanarEngine {
             if left < SHORTEST_IMPACT {
                 return Ok(());
             }
-            self.set_length(left, [0.5 * left, 0.0]);
+            self.set_length(left, ahead(left));
             self.begin_step(simd);
         }
     }

@@ -57,7 +57,7 @@ use wide::f64x2;
 
 pub(super) use self::beyond::GAUSS;
 use self::beyond::{Beyond, LARGEST_REPETITIONS};
-use self::contact::Law;
+use self::contact::{Ahead, Law};
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
@@ -240,7 +240,7 @@ impl PlanarEngine {
             floor: if robot.mount == Mount::Ground {
                 Floor::new(&frictions, 0.5 * thickness, Surface::new(extensions))
             } else {
-                Floor::default()
+                Floor::new(&[], 0.0, None)
             },
             iterate: vec![[Lanes::ZERO; 3]; quads.len()],
             largest_steps: LARGEST_STEPS + MORE_PER_BODY * count as u32,
@@ -262,7 +262,7 @@ impl PlanarEngine {
             pivoting: Workspace::default(),
             numerical_loss: 0.0,
         };
-        engine.law.landing_speed = engine.landing_speed();
+        engine.set_time_step(time_step, None)?;
         Ok(engine)
     }
 
@@ -473,7 +473,7 @@ impl PlanarEngine {
     fn advance_here<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
         self.begin_step(simd);
         self.floor.begin_whole();
-        if self.floor.landings()[0] < self.time_step {
+        if self.floor.landings(0.0)[0] < self.time_step {
             self.advance_in_parts(simd)?;
         } else {
             self.end_step(simd)?;
@@ -682,10 +682,14 @@ impl Engine for PlanarEngine {
                 let vector = engine.body_vector(i);
                 let right = [left[0] + vector[0], left[1] + vector[1]];
                 let (quad, lane) = place(i, engine.root);
-                let reference = if i < engine.root { right } else { left };
-                for [arm, impulse] in engine.floor.of_body(2 * quad + lane / 2, lane % 2, &engine.law) {
+                let ends = if i < engine.root { [right, left] } else { [left, right] };
+                // The side of the box that looks down.
+                let [cos, sin] = vector.map(|part| part / engine.lengths[i]);
+                let down = engine.floor.half_thickness().copysign(cos);
+                let impulses = engine.floor.impulses_on(2 * quad + lane / 2, lane % 2, &engine.law);
+                for (end, impulse) in ends.into_iter().zip(impulses) {
                     if impulse[1] > 0.0 {
-                        let position = [0, 1].map(|k| reference[k] + arm[k]);
+                        let position = [end[0] + down * sin, end[1] - down * cos];
                         contacts.push(Contact { link: i, position, force: impulse.map(|part| part / engine.time_step) });
                     }
                 }
@@ -724,7 +728,7 @@ impl Engine for PlanarEngine {
     }
 
     fn set_time_step(&mut self, time_step: f64, ahead: Option<f64>) -> Result<(), EngineError> {
-        self.set_length(time_step, ahead.map_or([0.5 * time_step, 0.0], |ahead| [ahead; 2]));
+        self.set_length(time_step, ahead.map_or_else(|| landing::ahead(time_step), Ahead::all));
         self.law.landing_speed = if ahead.is_none() { self.landing_speed() } else { f64::INFINITY };
         Ok(())
     }
