@@ -124,11 +124,13 @@ fn jumps_and_strides_are_bullets() {
             ];
             measures(&preset("inchworm", &settings.each_ref().map(String::as_str))).stride_mm.unwrap()
         };
-        let (bullet, planar) = (stride("bullet", "5e-6"), stride("planar", "1e-5"));
+        // Bullet's own scatter by 3 % with the step and with the order of its contacts.
+        let bullets = [1e-5, 5e-6].map(|step: f64| stride("bullet", &step.to_string()));
+        let (bullet, planar) = (0.5 * (bullets[0] + bullets[1]), stride("planar", "1e-5"));
         let apart = 100.0 * (planar / bullet - 1.0);
-        println!("5 Hz inchworm, friction {friction}: stride planar {planar:.4} mm, Bullet {bullet:.4} mm, apart {apart:.2} %");
-        // Seen: 1.9 % and 1.3 %.
-        assert!((planar / bullet - 1.0).abs() < 0.03, "friction {friction}: {planar} {bullet}");
+        println!("5 Hz inchworm, friction {friction}: stride planar {planar:.4} mm, Bullet {bullets:.4?} mm, apart {apart:.2} %");
+        // Seen: 0.6 % and −2.4 %.
+        assert!((planar / bullet - 1.0).abs() < 0.03, "friction {friction}: {planar} {bullets:?}");
     }
 }
 

@@ -3,9 +3,12 @@
 //! Six of them by default. `SFERS_RANDOM_EXPERIMENTS=200 cargo test --release --test random_experiments -- --nocapture` makes 200 and prints a line
 //! for each, which takes a minute; `scripts/test.sh --hidden` makes 200 too.
 
+mod common;
+
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use common::Random;
 use sfers::experiment::{self, Control, Experiment, Source};
 
 /// Another gives other experiments.
@@ -13,32 +16,10 @@ const SEED: u64 = 18;
 /// What is promised by default.
 const PROMISE: f64 = 1e-3;
 
-/// Numbers from 0 to 1 (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn share(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (count as f64 * self.share()) as usize
-    }
-
-    /// Evenly on a logarithmic scale.
-    fn scale(&mut self, low: f64, high: f64) -> f64 {
-        low * (high / low).powf(self.share())
-    }
-}
-
 /// A robot of 1 to 7 actuators with 1 to 5 joints each, on films of friction 0.1 to 5, driven at 2 to 18 Hz by a gait or by random phases: the
 /// experiment's text without its step, and the measure to look at.
 fn random(case: usize) -> (String, &'static str) {
-    let mut random = Random(SEED << 32 | case as u64);
+    let mut random = Random::new(SEED << 32 | case as u64);
     let actuators = 1 + random.below(7);
     let motors = 1 + random.below(5);
     let film = ["both-ends", "right-end", "none"][random.below(3)];

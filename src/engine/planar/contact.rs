@@ -30,9 +30,6 @@ const FASTEST_PUSH_OUT: f64 = 1e3;
 /// Approach speed (cm/s) below which nothing bounces, as in Bullet.
 const LEAST_BOUNCE: f64 = 0.2;
 
-/// Landings that are nearer (s) are at once.
-pub(super) const AT_ONCE: f64 = 1e-8;
-
 /// How long (s) after a step no corner may pass the floor: those that come down slower than [`Law::landing_speed`], the others, and of these such as are
 /// about to land.
 #[derive(Debug, Clone, Copy)]
@@ -65,6 +62,8 @@ pub(super) struct Law {
     push_out: f64,
     /// Corners that come down faster (cm/s) cut the step where they land.
     pub(super) landing_speed: f64,
+    /// Corners whose landing is nearer (s) at an impact are stopped with it: a step.
+    pub(super) at_once: f64,
     /// Share of the step's end in the mean motion.
     weight: f64,
     /// 1/R (g).
@@ -108,7 +107,7 @@ impl Law {
         if !fast.any() {
             return f64x2::splat(self.per_ahead);
         }
-        let lands = fma(velocity, f64x2::splat(AT_ONCE), gap).simd_lt(f64x2::ZERO);
+        let lands = fma(velocity, f64x2::splat(self.at_once), gap).simd_lt(f64x2::ZERO);
         let of_fast = lands.select(f64x2::splat(self.per_ahead_landing), f64x2::splat(self.per_ahead_fast));
         fast.select(of_fast, f64x2::splat(self.per_ahead))
     }
@@ -127,6 +126,7 @@ impl Law {
             per_ahead_landing: 1.0 / time_step,
             push_out: PUSH_OUT / time_step,
             landing_speed: f64::INFINITY,
+            at_once: 0.0,
             weight,
             stiffness: body_mass / SOFTNESS,
             frictionless: false,
@@ -145,6 +145,7 @@ impl Law {
             per_ahead_landing: 1.0,
             push_out: 0.0,
             landing_speed: f64::INFINITY,
+            at_once: 0.0,
             weight: 1.0,
             stiffness,
             frictionless: true,

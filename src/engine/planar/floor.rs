@@ -25,8 +25,8 @@ pub(super) struct Floor {
     changing: Vec<usize>,
     /// How many times corners were looked for.
     looks: u64,
-    /// When corners land in the step at hand (s from its start), of those that cut it, in no order.
-    landings: Vec<f64>,
+    /// See [`first_landing`](Self::first_landing).
+    landing: f64,
     /// Impulses (dyn·s) of the parts of a step that was cut, of all corners; otherwise empty.
     of_parts: Vec<[f64x2; 2]>,
 }
@@ -78,7 +78,7 @@ impl Floor {
             surface,
             half_thickness,
             looks: 0,
-            landings: Vec::with_capacity(2 * frictions.len() * 2),
+            landing: f64::INFINITY,
         }
     }
 
@@ -88,7 +88,7 @@ impl Floor {
     pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, velocity: [f64; 2], law: &Law) -> bool {
         self.near.clear();
         self.looks += 1;
-        self.landings.clear();
+        self.landing = f64::INFINITY;
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
@@ -171,20 +171,14 @@ impl Floor {
             // The gap is that of the step's middle.
             let time = gap / -velocity[1] + f64x2::splat(0.5 * law.reach().0);
             let time = comes.select(time.fast_max(f64x2::ZERO), f64x2::splat(f64::INFINITY));
-            self.landings.extend(time.to_array());
+            self.landing = time.to_array().into_iter().fold(self.landing, f64::min);
         }
     }
 
-    /// When the first corner lands in the step that corners were just looked for, and the first that does so by more than `apart` (s) later; infinite
-    /// where none does.
+    /// When the first corner lands in the step that corners were just looked for (s from its start), of those that cut it; infinite where none does.
     #[inline(always)]
-    pub(super) fn landings(&self, apart: f64) -> [f64; 2] {
-        if self.landings.is_empty() {
-            return [f64::INFINITY; 2];
-        }
-        let least = |times: &mut dyn Iterator<Item = &f64>| times.copied().fold(f64::INFINITY, f64::min);
-        let first = least(&mut self.landings.iter());
-        [first, least(&mut self.landings.iter().filter(|time| **time > first + apart))]
+    pub(super) fn first_landing(&self) -> f64 {
+        self.landing
     }
 
     /// Begins a step that is cut.

@@ -4,7 +4,8 @@
 //! of an impact, in shares that depend on where in the step it falls. Where other corners touch, plastic impacts with friction in one stage and in two
 //! have different results, so that finer steps would lead nowhere. Therefore a step ends a little before the first landing, and a part of the step
 //! of which the landing is the middle takes the impact at once (Moreau's law): the midpoint rule moves the corner by the mean of its velocities before
-//! and after, to the floor and not further. No other corner lands within that part, if they are not nearer than 10⁻⁸ s. Then the step goes on.
+//! and after, to the floor and not further. Corners that would land in what is left of the step are stopped with it, but for what takes them to the floor
+//! within a step: so those that land at once, as by symmetry, do, whatever rounding makes of them. Then the step goes on.
 //!
 //! Corners that come down slowly are left to the step, and after many landings, as of a body that rocks to rest, all others.
 //!
@@ -13,7 +14,7 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::contact::{AT_ONCE, Ahead};
+use super::contact::Ahead;
 use super::lanes::{Four, Lanes, fma};
 use super::{EngineError, FrictionModel, PlanarEngine, set_implicit, weight_of};
 
@@ -78,18 +79,18 @@ impl PlanarEngine {
         let (mut left, mut impacts) = (whole, 0);
         self.floor.begin_parts();
         loop {
-            let [first, second] = self.floor.landings(AT_ONCE);
+            let first = self.floor.first_landing();
             if first >= left || impacts == MOST_IMPACTS {
                 self.end_step(simd)?;
                 self.floor.end_part(&self.law);
                 return Ok(());
             }
             // What may lie on both sides of the landing.
-            let most = (0.5 * (second - first)).min(LONGEST_IMPACT).min(left - first).max(SHORTEST_IMPACT);
-            let length = if first <= most || first < AT_ONCE {
+            let most = LONGEST_IMPACT.min(left - first).max(SHORTEST_IMPACT);
+            let length = if first <= most {
                 impacts += 1;
                 let half = first.max(SHORTEST_IMPACT);
-                // Of those that land at once none is left with a speed of its own.
+                // Those that would land in this step too are stopped with it.
                 self.set_length((2.0 * half).min(left), Ahead { slow: half, fast: 0.0, landing: whole });
                 2.0 * half
             } else {

@@ -27,7 +27,7 @@
 //! ```
 //!
 //! so a corner never passes the floor: it stops on it, without bounce. These are the time steps of Stewart and Trinkle and of Moreau and Jean,
-//! with the midpoint rule between them. Newton's method over the corners' states (open, sticking, sliding either way), from those of the step
+//! with the midpoint rule between them. Steps are cut where corners land ([`landing`]). Newton's method over the corners' states (open, sticking, sliding either way), from those of the step
 //! before, puts active corners into the recursion as terms of their bodies' inertia. Where it goes round in circles the step is solved by pivoting
 //! ([`pivoting`]), for up to some hundred corners; a step that is not solved to rounding is an error. Where friction of Coulomb has several solutions (Painlevé),
 //! it is the one that Newton's method comes to from the states of the step before, otherwise that of the pivots.
@@ -473,7 +473,7 @@ impl PlanarEngine {
     fn advance_here<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
         self.begin_step(simd);
         self.floor.begin_whole();
-        if self.floor.landings(0.0)[0] < self.time_step {
+        if self.floor.first_landing() < self.time_step {
             self.advance_in_parts(simd)?;
         } else {
             self.end_step(simd)?;
@@ -729,6 +729,7 @@ impl Engine for PlanarEngine {
 
     fn set_time_step(&mut self, time_step: f64, ahead: Option<f64>) -> Result<(), EngineError> {
         self.set_length(time_step, ahead.map_or_else(|| landing::ahead(time_step), Ahead::all));
+        self.law.at_once = time_step;
         self.law.landing_speed = if ahead.is_none() { self.landing_speed() } else { f64::INFINITY };
         Ok(())
     }
