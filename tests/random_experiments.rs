@@ -25,7 +25,7 @@ fn random(case: usize) -> (String, &'static str) {
     let film = ["both-ends", "right-end", "none"][random.below(3)];
     let (low, high) = (random.scale(0.1, 5.0), random.scale(0.1, 5.0));
     // As large as fits at both ends of one actuator: a film covers ⌈m f + ½⌉ of its m + 1 segments.
-    let most = if actuators == 1 && motors % 2 == 0 { 0.5 - 0.5 / motors as f64 } else { 0.5 };
+    let most = if actuators == 1 && motors.is_multiple_of(2) { 0.5 - 0.5 / motors as f64 } else { 0.5 };
     let fraction = most * random.share();
     let damping = random.scale(0.02, 0.1);
     let frequency = 2.0 + 16.0 * random.share();
