@@ -484,16 +484,19 @@ impl Corners {
         self.touch = self.asked;
     }
 
-    /// Takes the states that the newest solution asks for, under Coulomb's law: but corners that slide and are asked to slide the other way stick,
-    /// for the pieces in between are so narrow that they are passed over otherwise. Those that change may be noted as `unsettled`.
+    /// Takes the states that the newest solution asks for, under Coulomb's law. Of corners that slide and are asked to slide the other way the pieces in
+    /// between are so narrow that they are passed over otherwise: such corners stick, unless they may turn.
     #[inline(always)]
-    pub(super) fn take_states(&mut self, unsettled: bool) {
-        if unsettled {
-            let (asked, before) = (self.asked.0.to_array(), self.touch.0.to_array());
-            (0..2).for_each(|lane| self.unsettled[lane] |= asked[lane] != before[lane]);
-        }
+    pub(super) fn take_states(&mut self, may_turn: bool) {
         let turned = self.asked.slides() & self.asked.0.simd_eq(-self.touch.0);
-        self.touch = Touch(turned.select(f64x2::ONE, self.asked.0));
+        self.touch = Touch(if may_turn { self.asked.0 } else { turned.select(f64x2::ONE, self.asked.0) });
+    }
+
+    /// Notes those as unsettled whose states change.
+    #[inline(always)]
+    pub(super) fn unsettle_asked(&mut self) {
+        let (asked, before) = (self.asked.0.to_array(), self.touch.0.to_array());
+        (0..2).for_each(|lane| self.unsettled[lane] |= asked[lane] != before[lane]);
     }
 
     /// Those whose states were not settled by Newton's method.

@@ -35,6 +35,8 @@ const DONE_OF_KINETIC: f64 = 1e-18;
 /// so many are in the circle. Measured: of the steps of a robot that jumps 1 %.
 const LARGEST_COULOMB: u32 = 4;
 const SETTLING: u32 = 2;
+/// More steps, in which corners that slide may turn round: where a whole robot does, most of these end the circle.
+const TURNING: u32 = 4;
 /// Impulses off the law by less than this share of the robot's weight over the step and of the largest impulse are rounding.
 const MISMATCH: f64 = 1e-7;
 /// And what rounding leaves of velocities, as a share of the largest: 64 units in the last place.
@@ -182,10 +184,15 @@ impl PlanarEngine {
                 if step > WHOLE && self.is_rounding(&among, law) {
                     return (step.into(), true);
                 }
-                if step > LARGEST_COULOMB {
+                if step > LARGEST_COULOMB + TURNING {
                     return (step.into(), false);
                 }
-                self.floor.near(&among, &self.quads, |_, corners, _| corners.take_states(step > SETTLING));
+                self.floor.near(&among, &self.quads, |_, corners, _| {
+                    if step > SETTLING && step <= LARGEST_COULOMB {
+                        corners.unsettle_asked();
+                    }
+                    corners.take_states(step > LARGEST_COULOMB);
+                });
                 continue;
             }
             match if step <= WHOLE { Search::Whole } else { self.search(simd, &rungs, &among, &felt, law) } {
