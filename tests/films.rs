@@ -1,6 +1,6 @@
 //! Random robots on films, on both engines.
 //!
-//! One by default. `SFERS_LONG=1 cargo test --release --test films -- --nocapture` takes 40 and prints a line for each, in some ten minutes.
+//! One by default. `SFERS_LONG=1 cargo test --release --test films -- --nocapture` takes 40 and prints a line for each, in a minute and a half.
 
 mod common;
 
@@ -38,7 +38,7 @@ fn random(case: usize) -> String {
     )
 }
 
-/// Where Bullet keeps its energy, and where half its step tells what it says, the planar engine's strides are within 3 % beyond that.
+/// Where Bullet keeps its energy, and where a run with twice its step tells its error, the planar engine's strides are within 3 % beyond that.
 #[test]
 fn robots_on_films_walk_as_on_bullet() {
     let count = if std::env::var("SFERS_LONG").is_ok_and(|long| long == "1") { 40 } else { 1 };

@@ -391,8 +391,8 @@ fn the_floor_gives_what_gravity_takes() {
 #[test]
 fn a_symmetric_jump_stays_symmetric() {
     let recording = run(&preset("jump-14hz", &["simulation.time_step_s=1e-4", "simulation.duration_s=1.2"])).recording;
-    // Seen: 1e-8 cm after four periods and 9e-5 cm after 17, for each landing makes more of what rounding left; Bullet: 1.2e-3 cm after two.
-    for (until, allowed) in [(0.28, 1e-7), (1.2, 1e-3)] {
+    // Seen: 2e-8 cm after four periods and 1.4e-6 cm after 17, for each landing makes more of what rounding left; Bullet: 1.2e-3 cm after two.
+    for (until, allowed) in [(0.28, 1e-7), (1.2, 1e-5)] {
         let mut worst = 0.0_f64;
         for record in (0..recording.len()).filter(|record| recording.time[*record] < until) {
             for node in 0..recording.nodes() {
@@ -409,7 +409,7 @@ fn a_symmetric_jump_stays_symmetric() {
 fn a_passive_robot_never_gains_energy() {
     for friction in [0.2, 0.5, 4.0] {
         let rise = largest_rise(friction);
-        // Seen: 2e-13 of the first energy, far below what push-out would give.
+        // Seen: none at all.
         assert!(rise < 1e-12, "friction {friction}: {rise:e}");
     }
 }
