@@ -46,7 +46,7 @@ fn steps_allocate_nothing() {
             };
             let means = |time: f64| Means::new(&experiment.drive, experiment.robot.actuators, time);
             steps(robot.as_mut(), &mut means(0.0), 10);
-            // The same steps twice: the first time may set aside what contact needs that is solved by pivoting.
+            // The same steps twice: the first time may set aside what contact needs that is solved along a path.
             let (begin, state) = (robot.step(), robot.save().unwrap());
             let again = || means(begin as f64 * experiment.time_step);
             steps(robot.as_mut(), &mut again(), 5000);

@@ -30,7 +30,7 @@ fn a_mover_on_rough_films_goes_as_on_bullet_at_every_delay() {
         (0.08, 5.74, 5.9055),
         (0.1, 5.57, 5.5907),
     ];
-    let (mut apart, mut pivoted) = (0.0, 0);
+    let (mut apart, mut paths) = (0.0, 0);
     for (delay, bullet, converged) in known {
         for (step, within) in [(1e-4, 0.03), (1e-5, 0.003)] {
             let experiment = mover(delay, step);
@@ -40,13 +40,13 @@ fn a_mover_on_rough_films_goes_as_on_bullet_at_every_delay() {
             // Seen: at most 2.1 % and 0.11 %.
             assert!((found / converged - 1.0_f64).abs() < within, "{delay} {step}: {found}, {converged}");
             apart += if step == 1e-5 { (found - bullet).powi(2) } else { 0.0 };
-            pivoted += engine.pivoted();
+            paths += engine.paths();
         }
     }
     // Seen: 0.074 mm.
     let apart = (apart / known.len() as f64).sqrt();
     assert!(apart < 0.1, "{apart} mm (rms) from Bullet");
-    assert!(pivoted > 100, "{pivoted} steps by pivoting");
+    assert!(paths > 100, "{paths} paths");
 }
 
 /// A robot on which plastic impacts in two stages end elsewhere than in one. Where a corner that lands within a step is stopped over two steps, it goes
@@ -76,7 +76,7 @@ fn finer_steps_lead_where_adaptive_ones_do() {
 /// Forces of a floor are in their cone, and what slides is pushed against its motion, whatever the robot and its friction: half of them rough.
 #[test]
 fn coulombs_law_holds_in_every_step() {
-    let (mut touched, mut slid, mut pivoted) = (0, 0, 0);
+    let (mut touched, mut slid, mut paths) = (0, 0, 0);
     for case in 0..24_u32 {
         // Numbers from 0 to 1 that fill it evenly.
         let share = |k: u32| (0.5 + f64::from(case + 1) * [0.618_034, 0.754_878, 0.569_840, 0.819_173][k as usize]).fract();
@@ -114,9 +114,9 @@ fn coulombs_law_holds_in_every_step() {
                 slid += u32::from(x.abs() > (1.0 - 1e-6) * most);
             }
         }
-        pivoted += engine.pivoted();
+        paths += engine.paths();
     }
-    // All kinds of contact were there. Seen: 220 steps by pivoting.
-    println!("{touched} contacts, {slid} of them slid, {pivoted} steps by pivoting");
-    assert!(slid > 1000 && touched > slid + 1000 && pivoted > 50, "{touched} {slid} {pivoted}");
+    // All kinds of contact were there. Seen: 300 paths.
+    println!("{touched} contacts, {slid} of them slid, {paths} paths");
+    assert!(slid > 1000 && touched > slid + 1000 && paths > 50, "{touched} {slid} {paths}");
 }

@@ -237,8 +237,6 @@ pub(super) struct Corners {
     touch: Touch,
     /// The states that the newest solution asks for.
     asked: Touch,
-    /// Those whose states still changed after some iterations of Newton's method for Coulomb's law.
-    unsettled: [bool; 2],
     grip: Grip,
     /// Mean velocity w* that stops them on the floor at the end (cm/s).
     target: [f64x2; 2],
@@ -283,7 +281,6 @@ impl Corners {
         self.look = look;
         self.near = near;
         self.arm = arm;
-        self.unsettled = [false; 2];
         self.target = [before[0] * (f64x2::ONE - weight), fma(weight, end - before[1], before[1])];
     }
 
@@ -448,10 +445,11 @@ impl Corners {
         self.impulse.iter().flat_map(|part| part.abs().to_array()).fold(0.0, f64::max)
     }
 
-    /// Mean velocity (cm/s) of the corner in a lane less what stops it on the floor.
-    pub(super) fn excess(&self, lane: usize, mean: &Spatials) -> [f64; 2] {
+    /// Mean velocities (cm/s) less what stops the corners on the floor.
+    #[inline(always)]
+    pub(super) fn excess(&self, mean: &Spatials) -> [f64x2; 2] {
         let v = self.velocity_in(mean);
-        [0, 1].map(|k| (v[k] - self.target[k]).to_array()[lane])
+        [v[0] - self.target[0], v[1] - self.target[1]]
     }
 
     /// Of the corner in a lane, if it is near the floor: arm (cm) and coefficient of friction.
@@ -460,15 +458,21 @@ impl Corners {
         is_near.then(|| (self.arm.map(|part| part.to_array()[lane]), self.grip.friction.to_array()[lane]))
     }
 
-    /// Sets the state of the corner in a lane and the floor's impulse on it (dyn·s, times the weight).
-    pub(super) fn set_solved(&mut self, lane: usize, state: f64, impulse: [f64; 2]) {
-        let with = |of: f64x2, value: f64| {
-            let mut both = of.to_array();
-            both[lane] = value;
-            f64x2::new(both)
-        };
-        self.touch = Touch(with(self.touch.0, state));
-        (0..2).for_each(|k| self.impulse[k] = with(self.impulse[k], impulse[k]));
+    /// The states.
+    pub(super) fn states(&self) -> [f64; 2] {
+        self.touch.0.to_array()
+    }
+
+    /// Which of them the newest solution that was asked for leaves in their states.
+    pub(super) fn agree(&self) -> [bool; 2] {
+        let (asked, states) = (self.asked.0.to_array(), self.states());
+        [0, 1].map(|lane| asked[lane] == states[lane])
+    }
+
+    /// Puts the corners in these states.
+    #[inline(always)]
+    pub(super) fn set_states(&mut self, states: [f64; 2]) {
+        self.touch = Touch(f64x2::new(states));
     }
 
     /// Whether one of them slides.
@@ -485,47 +489,11 @@ impl Corners {
     }
 
     /// Takes the states that the newest solution asks for, under Coulomb's law. Of corners that slide and are asked to slide the other way the pieces in
-    /// between are so narrow that they are passed over otherwise: such corners stick, unless they may turn.
+    /// between are so narrow that they are passed over otherwise: such corners stick.
     #[inline(always)]
-    pub(super) fn take_states(&mut self, may_turn: bool) {
+    pub(super) fn take_states(&mut self) {
         let turned = self.asked.slides() & self.asked.0.simd_eq(-self.touch.0);
-        self.touch = Touch(if may_turn { self.asked.0 } else { turned.select(f64x2::ONE, self.asked.0) });
-    }
-
-    /// Notes those as unsettled whose states change.
-    #[inline(always)]
-    pub(super) fn unsettle_asked(&mut self) {
-        let (asked, before) = (self.asked.0.to_array(), self.touch.0.to_array());
-        (0..2).for_each(|lane| self.unsettled[lane] |= asked[lane] != before[lane]);
-    }
-
-    /// Those whose states were not settled by Newton's method.
-    pub(super) fn unsettled(&self) -> [bool; 2] {
-        self.unsettled
-    }
-
-    /// Notes those as unsettled that the bodies' motion `mean` asks for other states than they are in; whether one is new among them. The impulses
-    /// of the others belong to it then.
-    pub(super) fn unsettle_changed(&mut self, mean: &Spatials, law: &Law) -> bool {
-        let (asked, impulse) = self.law(self.velocity_in(mean), law);
-        let [asked, touch] = [asked.0, self.touch.0].map(f64x2::to_array);
-        let [x, z] = impulse.map(f64x2::to_array);
-        let mut new = false;
-        for lane in 0..2 {
-            if self.unsettled[lane] {
-                continue;
-            }
-            self.unsettled[lane] = asked[lane] != touch[lane];
-            new |= self.unsettled[lane];
-            self.set_solved(lane, touch[lane], [x[lane], z[lane]]);
-        }
-        new
-    }
-
-    /// Notes those as unsettled in whose state `which` holds.
-    pub(super) fn unsettle(&mut self, which: impl Fn(f64) -> bool) {
-        let states = self.touch.0.to_array();
-        (0..2).for_each(|lane| self.unsettled[lane] |= which(states[lane]));
+        self.touch = Touch(turned.select(f64x2::ONE, self.asked.0));
     }
 
     /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).

@@ -263,27 +263,16 @@ impl Floor {
         self.near.iter().map(|place| (*place, &self.corners[*place]))
     }
 
-    /// Mean velocity (cm/s) of a corner less what stops it on the floor.
-    pub(super) fn excess(&self, place: usize, lane: usize, quads: &[Quad]) -> [f64; 2] {
-        self.corners[place].excess(lane, &mean_at(place, quads))
+    /// Mean velocities (cm/s) of the corners of a place less what stops them on the floor.
+    #[inline(always)]
+    pub(super) fn excess(&self, place: usize, quads: &[Quad]) -> [f64x2; 2] {
+        self.corners[place].excess(&mean_at(place, quads))
     }
 
-    /// Sets a corner's state and impulse, as [`Corners::set_solved`].
-    pub(super) fn set_solved(&mut self, place: usize, lane: usize, state: f64, impulse: [f64; 2]) {
-        self.corners[place].set_solved(lane, state, impulse);
-    }
-
-    /// As [`Corners::unsettle_changed`], for all listed corners.
-    pub(super) fn unsettle_changed(&mut self, quads: &[Quad], law: &Law) -> bool {
-        let all = self.all();
-        let mut new = false;
-        self.near(&all, quads, |_, corners, mean| new |= corners.unsettle_changed(mean, law));
-        new
-    }
-
-    /// Notes listed corners as unsettled in whose state `which` holds.
-    pub(super) fn unsettle(&mut self, which: impl Fn(f64) -> bool) {
-        self.near.iter().for_each(|place| self.corners[*place].unsettle(&which));
+    /// Puts the corners of a place in these states.
+    #[inline(always)]
+    pub(super) fn set_states(&mut self, place: usize, states: [f64; 2]) {
+        self.corners[place].set_states(states);
     }
 
     /// Listed corners, for the walk to the root.

@@ -27,10 +27,10 @@
 //! ```
 //!
 //! so a corner never passes the floor: it stops on it, without bounce. These are the time steps of Stewart and Trinkle and of Moreau and Jean,
-//! with the midpoint rule between them. Steps are cut where corners land ([`landing`]). Newton's method over the corners' states (open, sticking, sliding either way), from those of the step
-//! before, puts active corners into the recursion as terms of their bodies' inertia. Where it goes round in circles the step is solved by pivoting
-//! ([`pivoting`]), for up to some hundred corners; a step that is not solved to rounding is an error. Where friction of Coulomb has several solutions (Painlevé),
-//! it is the one that Newton's method comes to from the states of the step before, otherwise that of the pivots.
+//! with the midpoint rule between them. Steps are cut where corners land ([`landing`]). Newton's method over the corners' contact modes (open, sticking,
+//! sliding either way), from those of the step before, puts active corners into the recursion as terms of their bodies' inertia. Where it goes round in
+//! circles a path is followed that changes one corner at a time ([`path`]), in the end Lemke's from open corners. A step that is not solved to rounding is
+//! an error. Where Coulomb's law has several solutions (Painlevé), it is the first of these methods that chooses.
 //!
 //! [`FrictionModel::Convex`] is the convex model of Anitescu instead: its minimum is unique, and sliding lifts a corner by μ·h·|v_t|, which
 //! vanishes with the step. In long chains the parts where corners change are solved by themselves in between.
@@ -47,7 +47,7 @@ mod floor;
 mod landing;
 mod lanes;
 mod newton;
-mod pivoting;
+mod path;
 mod places;
 mod recursion;
 mod statics;
@@ -61,7 +61,6 @@ use self::contact::{Ahead, Law};
 use self::floor::{Floor, Surface};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
-use self::pivoting::Workspace;
 use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -142,9 +141,9 @@ pub struct PlanarEngine {
     work_sums: [f64; 2],
     /// Newton iterations so far, of all steps.
     iterations: u64,
-    /// Steps solved by pivoting.
-    pivoted: u64,
-    pivoting: Workspace,
+    /// Paths that were followed.
+    paths: u64,
+    path: Vec<path::Pair>,
     /// Energy that the weight of the step's end has taken so far (erg).
     numerical_loss: f64,
 }
@@ -258,8 +257,8 @@ impl PlanarEngine {
             finite: false,
             work_sums: [0.0; 2],
             iterations: 0,
-            pivoted: 0,
-            pivoting: Workspace::default(),
+            paths: 0,
+            path: Vec::new(),
             numerical_loss: 0.0,
         };
         engine.set_time_step(time_step, None)?;
@@ -271,9 +270,9 @@ impl PlanarEngine {
         self.iterations
     }
 
-    /// Steps so far whose contact was solved by pivoting, for Newton's method went round in circles.
-    pub fn pivoted(&self) -> u64 {
-        self.pivoted
+    /// Paths that were followed so far where Newton's method went in circles: seldom more than one in a step.
+    pub fn paths(&self) -> u64 {
+        self.paths
     }
 
     /// Chooses the law of friction.
