@@ -30,8 +30,8 @@ pub(super) const LONGEST: f64 = 1e-3;
 const SHORTEST: f64 = 1e-8;
 /// The shortest half of an impact's step (s).
 const SHORTEST_IMPACT: f64 = 1e-10;
-/// What rounding leaves of a stretch of time (s).
-const SLIVER: f64 = 1e-12;
+/// What rounding leaves of a stretch of time (s), after thousands of steps.
+const SLIVER: f64 = 1e-10;
 /// Impacts that follow on each other at once; those after are left to ordinary steps.
 const MOST_IMPACTS: u32 = 200;
 /// Share that is taken of the step that the error allows.

@@ -12,9 +12,14 @@ use super::FrictionModel;
 use super::lanes::fma;
 use super::recursion::{Arms, Spatials};
 
-/// Softness of contact as a share of a body's inverse mass: under half its weight a corner gives way by 3·10⁻⁸ cm/s at steps of 10⁻⁴ s.
-/// Ten times stiffer contact changes heights and strides by 10⁻⁴ of them and takes a tenth more iterations.
+/// Softness of contact, as a share of a body's inverse mass, of impacts and of steps of this length (s). Otherwise it is in inverse proportion to the step:
+/// under a force a corner gives way by the same speed whatever the step, 3·10⁻⁸ cm/s under half a body's weight. A robot that lies on many corners would rest on
+/// others at other steps, and on films of high friction strides would differ by 1 %. Ten times stiffer contact changes heights by 10⁻⁴ of them,
+/// strides on such films by up to 0.5 %.
 const SOFTNESS: f64 = 6e-7;
+const STEP_OF_SOFTNESS: f64 = 1e-4;
+/// Steps so short (s) are an instant, of an impact or next to one.
+const INSTANT: f64 = 2e-8;
 /// Largest change of a corner's vertical velocity in a step (cm/s) that is looked ahead for: more than the robots fall with.
 const LARGEST_CHANGE: f64 = 150.0;
 /// Share of a penetration that is pushed out per step, and the largest speed of it (cm/s): so slow that it makes no energy to speak of.
@@ -68,6 +73,7 @@ pub(super) struct Law {
     weight: f64,
     /// 1/R (g).
     stiffness: f64,
+    stiffness_of_impacts: f64,
     frictionless: bool,
     pub(super) friction: FrictionModel,
 }
@@ -90,6 +96,8 @@ impl Law {
         [self.per_ahead, self.per_ahead_fast, self.per_ahead_landing] =
             [slow, fast, landing].map(|ahead| 1.0 / (0.5 * time_step + ahead));
         self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
+        let is_impact = fast == 0.0 || time_step <= INSTANT;
+        self.stiffness = self.stiffness_of_impacts * if is_impact { 1.0 } else { time_step / STEP_OF_SOFTNESS };
     }
 
     /// Open corners with these gaps in the step's middle (cm) and velocities along z (cm/s), if they go on so, that cut the step where they land: those
@@ -112,6 +120,11 @@ impl Law {
         fast.select(of_fast, f64x2::splat(self.per_ahead))
     }
 
+    /// Makes contact a hundred times softer.
+    pub(super) fn soften(&mut self) {
+        self.stiffness *= 0.01;
+    }
+
     /// 1/R (g).
     pub(super) fn stiffness(&self) -> f64 {
         self.stiffness
@@ -129,6 +142,7 @@ impl Law {
             at_once: 0.0,
             weight,
             stiffness: body_mass / SOFTNESS,
+            stiffness_of_impacts: body_mass / SOFTNESS,
             frictionless: false,
             friction,
         }
@@ -148,6 +162,7 @@ impl Law {
             at_once: 0.0,
             weight: 1.0,
             stiffness,
+            stiffness_of_impacts: stiffness,
             frictionless: true,
             friction,
         }
@@ -248,6 +263,18 @@ pub(super) struct Corners {
     impulse: [f64x2; 2],
 }
 
+/// Where two corners are, and how they move.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Coming {
+    /// From their bodies' reference points in the middle of the step (cm).
+    pub(super) arm: [f64x2; 2],
+    /// Above the floor (cm) in the middle of the step, if they go straight on.
+    pub(super) gap: f64x2,
+    /// At the start of the step (cm/s), and by how much it turns in half a step.
+    pub(super) velocity: [f64x2; 2],
+    pub(super) curve: [f64x2; 2],
+}
+
 #[inline(always)]
 fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
     fma(a[0], b[0], a[1] * b[1])
@@ -263,11 +290,13 @@ impl Corners {
         self.grip = grip;
     }
 
-    /// Prepares those of the mask `near`, at `arm` from their bodies' reference points, `gap` (cm) above the floor, that move with `before`
-    /// (cm/s): what mean velocity stops them on the floor at the step's end. They go on in the states of the step before, if this was near
-    /// in the `look` before this one.
+    /// Prepares those of the mask `near`: what mean velocity stops them on the floor at the step's end. They go on in the states of the step before, if
+    /// this was near in the `look` before this one.
+    ///
+    /// From v to v⁺ at the ends of the step a corner's mean velocity in the pose of the middle is w v⁺ + (1 − w) v + (1 − 2 w) curve.
     #[inline(always)]
-    pub(super) fn place(&mut self, look: u64, near: f64x2, arm: [f64x2; 2], gap: f64x2, before: [f64x2; 2], law: &Law) {
+    pub(super) fn place(&mut self, look: u64, near: f64x2, coming: &Coming, law: &Law) {
+        let Coming { arm, gap, velocity: before, curve } = *coming;
         let weight = f64x2::splat(law.weight);
         let ahead = gap * -law.per_ahead(gap, before[1]);
         let end = if law.frictionless {
@@ -281,7 +310,9 @@ impl Corners {
         self.look = look;
         self.near = near;
         self.arm = arm;
+        let uneven = f64x2::ONE - weight - weight;
         self.target = [before[0] * (f64x2::ONE - weight), fma(weight, end - before[1], before[1])];
+        (0..2).for_each(|k| self.target[k] = fma(uneven, curve[k], self.target[k]));
     }
 
     /// Takes stored states up again.

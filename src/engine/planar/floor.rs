@@ -5,7 +5,7 @@ use std::ops::Range;
 use wide::f64x2;
 
 use super::LARGEST_FRICTION;
-use super::contact::{Corners, Grip, Law, Touch};
+use super::contact::{Coming, Corners, Grip, Law, Touch};
 use super::lanes::{Lanes, fma, pair};
 use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
@@ -36,6 +36,8 @@ pub(super) struct Floor {
 struct Reference {
     gap: f64x2,
     velocity: [f64x2; 2],
+    /// At these rates (cm/s²).
+    acceleration: [f64x2; 2],
     rate: f64x2,
     there: f64x2,
 }
@@ -82,10 +84,10 @@ impl Floor {
         }
     }
 
-    /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and
-    /// moving with `velocity` (cm/s); whether any does. Lanes without mass have no corners.
+    /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and with this velocity
+    /// (cm/s) and acceleration at constant rates (cm/s²); whether any does. Lanes without mass have no corners.
     #[inline(always)]
-    pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, velocity: [f64; 2], law: &Law) -> bool {
+    pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, root: [[f64; 2]; 2], law: &Law) -> bool {
         self.near.clear();
         self.looks += 1;
         self.landing = f64::INFINITY;
@@ -93,7 +95,7 @@ impl Floor {
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
-        let mut moving = velocity.map(f64x2::splat);
+        let [mut moving, mut bending] = root.map(|part| part.map(f64x2::splat));
         for k in 0..rungs {
             let quad = &quads[k / 2];
             let (along, across) = (pair(&quad.along, k % 2), pair(&quad.across, k % 2));
@@ -106,12 +108,20 @@ impl Floor {
             let (inner, outer) = (near(x, z), near(outer_x, outer_z));
             if (inner | outer).any() {
                 // Most rungs are not: what only these need is made here.
-                let from = Reference { gap: at, velocity: moving, rate, there: quad.mass.rung(k % 2).simd_gt(f64x2::ZERO) };
+                let from = Reference {
+                    gap: at,
+                    velocity: moving,
+                    acceleration: bending,
+                    rate,
+                    there: quad.mass.rung(k % 2).simd_gt(f64x2::ZERO),
+                };
                 self.place(2 * k, inner, [x, z], &from, law);
                 self.place(2 * k + 1, outer, [outer_x, outer_z], &from, law);
             }
             at = next(at, across[1], k);
-            moving = [next(moving[0], -rate * across[1], k), next(moving[1], rate * across[0], k)];
+            let turned = [rate * across[1], rate * across[0]];
+            moving = [next(moving[0], -turned[0], k), next(moving[1], turned[1], k)];
+            bending = [next(bending[0], -rate * turned[1], k), next(bending[1], -rate * turned[0], k)];
         }
         !self.near.is_empty()
     }
@@ -159,9 +169,11 @@ impl Floor {
             return;
         }
         let rate = from.rate;
-        let gap = from.gap + arm[1];
-        let velocity = [fma(-rate, arm[1], from.velocity[0]), fma(rate, arm[0], from.velocity[1])];
-        self.corners[place].place(self.looks, near, arm, gap, velocity, law);
+        let half_step = f64x2::splat(0.5 * law.reach().0);
+        let curve = [0, 1].map(|k| fma(-rate * rate, arm[k], from.acceleration[k]) * half_step);
+        let gap = fma(curve[1], f64x2::splat(-0.25 * law.reach().0), from.gap + arm[1]);
+        let velocity = [fma(-rate, arm[1], from.velocity[0]) - curve[0], fma(rate, arm[0], from.velocity[1]) - curve[1]];
+        self.corners[place].place(self.looks, near, &Coming { arm, gap, velocity, curve }, law);
         if self.surface.is_some() {
             self.feel_surface(place, gap, velocity, law);
         }

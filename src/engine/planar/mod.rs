@@ -23,8 +23,12 @@
 //! The two bottom corners of every box may touch the floor. In velocities v⁺ at the end of the step, with a look-ahead of one step,
 //!
 //! ```text
-//! 0 ≤ v_n⁺ + gap/h  ⊥  λ_n ≥ 0,        |λ_t| ≤ μ λ_n
+//! 0 ≤ v_n⁺ + gap/h + c λ_n/h  ⊥  λ_n ≥ 0,        |λ_t| ≤ μ λ_n
 //! ```
+//!
+//! with v⁺ in the pose of the end: that of the middle gives J V⁺, and the way of a corner turns by h/2 of its acceleration at constant rates until then.
+//! Without it a corner that stands still on a turning body would creep by h/2 of that, and results would be of first order. c is so small that it only says
+//! how a weight is shared among many corners, the same at all steps ([`contact`]).
 //!
 //! so a corner never passes the floor: it stops on it, without bounce. These are the time steps of Stewart and Trinkle and of Moreau and Jean,
 //! with the midpoint rule between them. Steps are cut where corners land ([`landing`]). Newton's method over the corners' contact modes (open, sticking,
@@ -75,6 +79,9 @@ pub(super) const LARGEST_FRICTION: f64 = 10.0;
 const NUMERICAL_DAMPING: f64 = 50.0;
 /// The links' directions are computed anew every so many steps, for turning them on loses a last digit at times.
 const EXACT_EVERY: u64 = 256;
+
+/// Largest angles (rad), rates, places and velocities (CGS): their squares are numbers too.
+const LARGEST_COORDINATE: f64 = 1e100;
 
 /// The law of friction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -343,35 +350,37 @@ impl PlanarEngine {
         seen
     }
 
-    /// Where the root's reference point is (cm), as the links are turned, and its velocity (cm/s), from the rates and the velocity of the
-    /// centre of mass.
+    /// Where the root's reference point is (cm), as the links are turned, its velocity (cm/s), from the rates and the velocity of the centre of mass,
+    /// and its acceleration (cm/s²) if these stay.
     #[inline(always)]
-    fn root_motion<S: Simd>(&self, simd: S) -> ([f64; 2], [f64; 2]) {
+    fn root_motion<S: Simd>(&self, simd: S) -> [[f64; 2]; 3] {
         if self.clamped() {
-            return (self.centre, [0.0; 2]);
+            return [self.centre, [0.0; 2], [0.0; 2]];
         }
         let zero = Four::splat(simd, 0.0);
-        let (mut position, mut velocity) = ([zero; 2], [zero; 2]);
+        let (mut position, mut velocity, mut acceleration) = ([zero; 2], [zero; 2], [zero; 2]);
         for quad in &self.quads {
             let (lever, rate) = (quad.lever.on(simd), quad.motion[0].on(simd));
             let [x, z] = on(simd, &quad.along).map(|along| lever * along);
             position = [position[0] + x, position[1] + z];
-            velocity = [fma(-rate, z, velocity[0]), fma(rate, x, velocity[1])];
+            let turned = [rate * z, rate * x];
+            velocity = [velocity[0] - turned[0], velocity[1] + turned[1]];
+            acceleration = [fma(rate, turned[1], acceleration[0]), fma(rate, turned[0], acceleration[1])];
         }
         let less = |of: [Four<S>; 2], from: [f64; 2]| [0, 1].map(|k| from[k] - Lanes::from(of[k]).sum());
-        (less(position, self.centre), less(velocity, self.velocity))
+        [less(position, self.centre), less(velocity, self.velocity), acceleration.map(|part| Lanes::from(part).sum())]
     }
 
-    /// Height of a free robot's root (cm) in the middle of the step, as the links are turned, and its velocity at the start.
+    /// Height of a free robot's root (cm) in the middle of the step, as the links are turned, and its velocity and acceleration at the start.
     #[inline(always)]
-    fn root_over_floor<S: Simd>(&self, simd: S) -> (f64, [f64; 2]) {
-        let ([_, height], velocity) = self.root_motion(simd);
-        (height + 0.5 * self.time_step * self.velocity[1], velocity)
+    fn root_over_floor<S: Simd>(&self, simd: S) -> (f64, [[f64; 2]; 2]) {
+        let [[_, height], velocity, acceleration] = self.root_motion(simd);
+        (height + 0.5 * self.time_step * self.velocity[1], [velocity, acceleration])
     }
 
     /// Position and velocity of the left end of the chain, as the links are turned, with the state's velocities.
     fn left_end(&self) -> ([f64; 2], [f64; 2]) {
-        let (mut position, mut velocity) = dispatch!(self.level, simd => self.root_motion(simd));
+        let [mut position, mut velocity, _] = dispatch!(self.level, simd => self.root_motion(simd));
         // The left arm's other ends are left ends.
         for i in (0..self.root).rev() {
             let [x, z] = [0, 1].map(|k| self.of_body(i, |quad| quad.across[k]));
@@ -510,7 +519,7 @@ impl PlanarEngine {
             momentum = [fma(share, after[1], momentum[0]), fma(share, after[2], momentum[1])];
         }
         let changed = Lanes::from(changed).sum();
-        self.finite = changed.is_finite();
+        self.finite = changed < LARGEST_COORDINATE;
         self.numerical_loss += (self.weight - 0.5) / (self.weight * self.weight) * changed;
         if !self.clamped() {
             for (k, share) in momentum.into_iter().enumerate() {
@@ -545,18 +554,23 @@ impl PlanarEngine {
         }
     }
 
-    /// Fails if a coordinate is no number.
+    /// Fails if a coordinate is no number, or so large that no recording takes it.
     fn check_finite(&mut self) -> Result<(), EngineError> {
         self.read_joints();
-        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !(a + r).is_finite());
-        if bad.is_none() && self.centre.iter().chain(&self.velocity).all(|value| value.is_finite()) {
+        let sound = |value: f64| value.abs() <= LARGEST_COORDINATE;
+        let bad = self.state.angles.iter().zip(&self.state.rates).position(|(a, r)| !sound(*a) || !sound(*r));
+        if bad.is_none() && self.centre.iter().chain(&self.velocity).all(|value| sound(*value)) {
             self.finite = true;
             return Ok(());
         }
-        let what =
-            bad.map_or_else(|| "the centre of mass".to_owned(), |joint| format!("the angle or rate of joint {}", joint + 1));
+        let of_joint = |joint: usize| [self.state.angles[joint], self.state.rates[joint]];
+        let (what, values) = match bad {
+            Some(joint) => (format!("the angle or rate of joint {}", joint + 1), of_joint(joint).to_vec()),
+            None => ("the centre of mass".to_owned(), [self.centre, self.velocity].concat()),
+        };
+        let value = values.into_iter().find(|value| !sound(*value)).unwrap_or(f64::NAN);
         let time = self.step as f64 * self.time_step;
-        Err(EngineError::NotFinite { what, value: f64::NAN, step: self.step, time, stable_step: None })
+        Err(EngineError::NotFinite { what, value, step: self.step, time, stable_step: None })
     }
 }
 
