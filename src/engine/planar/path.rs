@@ -12,10 +12,10 @@
 //! pass of the recursion gives, until a first corner comes to the border of its cone. This corner changes its mode, and the path goes on: towards the solution for the new modes, or
 //! away from it (t grows) where only that leads across the border. It ends where a solution lies in the cones of its modes.
 //!
-//! From the modes that Newton's method came to the path is short, but may go to infinity. From open corners with r > 0 along z it is Lemke's, and
-//! ends: where t is large all corners must be open, for a solution has 0 ≥ λᵀ e = λᵀ W λ + λᵀ(q + t r); and where it is not, λᵀ W λ ≤ −λᵀ(q + t r) bounds λ, for W is positive
-//! definite by the law's compliance. Where corners come to borders at the same time, rounding decides who is first. Of several solutions (Painlevé) it
-//! is the one that the path comes to.
+//! From the modes that Newton's method came to the path is short, but may go to infinity. From open corners with r > 0 along z it is Lemke's, and ends. For
+//! by the law λᵀe ≤ −R |λ_n|², while λᵀe = λᵀWλ + λᵀ(q + t r) ≥ λᵀ(q + t r): where t is large this is positive unless all corners are open, and
+//! elsewhere R |λ_n|² ≤ −λᵀ(q + t r) bounds λ. Where corners come to borders at the same time, rounding decides who is first. Of several solutions
+//! (Painlevé) it is the one that the path comes to.
 //!
 //! C. E. Lemke, Management Science 11 (1965); D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth. Eng. 39 (1996); D. Ralph, Math. Oper. Res. 19 (1994)
 //! and S. P. Dirkse and M. C. Ferris, Optim. Methods Softw. 5 (1995) (paths of piecewise linear equations).
