@@ -15,7 +15,7 @@ use super::recursion::{Arms, Spatials};
 /// Softness of contact, as a share of a body's inverse mass, of impacts and of steps of this length (s). Otherwise it is in inverse proportion to the step:
 /// under a force a corner gives way by the same speed whatever the step, 3·10⁻⁸ cm/s under half a body's weight. A robot that lies on many corners would rest on
 /// others at other steps, and on films of high friction strides would differ by 1 %. Ten times stiffer contact changes heights by 10⁻⁴ of them,
-/// strides on such films by up to 0.5 %.
+/// three results on such films by 0.3 to 0.4 %.
 const SOFTNESS: f64 = 6e-7;
 const STEP_OF_SOFTNESS: f64 = 1e-4;
 /// Steps so short (s) are an instant, of an impact or next to one.
@@ -263,9 +263,9 @@ pub(super) struct Corners {
     impulse: [f64x2; 2],
 }
 
-/// Where two corners are, and how they move.
+/// Two contact candidates: where these corners are, and how they move.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Coming {
+pub(super) struct Candidates {
     /// From their bodies' reference points in the middle of the step (cm).
     pub(super) arm: [f64x2; 2],
     /// Above the floor (cm) in the middle of the step, if they go straight on.
@@ -295,8 +295,8 @@ impl Corners {
     ///
     /// From v to v⁺ at the ends of the step a corner's mean velocity in the pose of the middle is w v⁺ + (1 − w) v + (1 − 2 w) curve.
     #[inline(always)]
-    pub(super) fn place(&mut self, look: u64, near: f64x2, coming: &Coming, law: &Law) {
-        let Coming { arm, gap, velocity: before, curve } = *coming;
+    pub(super) fn place(&mut self, look: u64, near: f64x2, candidates: &Candidates, law: &Law) {
+        let Candidates { arm, gap, velocity: before, curve } = *candidates;
         let weight = f64x2::splat(law.weight);
         let ahead = gap * -law.per_ahead(gap, before[1]);
         let end = if law.frictionless {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use wide::f64x2;
 
 use super::LARGEST_FRICTION;
-use super::contact::{Coming, Corners, Grip, Law, Touch};
+use super::contact::{Candidates, Corners, Grip, Law, Touch};
 use super::lanes::{Lanes, fma, pair};
 use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
@@ -173,7 +173,7 @@ impl Floor {
         let curve = [0, 1].map(|k| fma(-rate * rate, arm[k], from.acceleration[k]) * half_step);
         let gap = fma(curve[1], f64x2::splat(-0.25 * law.reach().0), from.gap + arm[1]);
         let velocity = [fma(-rate, arm[1], from.velocity[0]) - curve[0], fma(rate, arm[0], from.velocity[1]) - curve[1]];
-        self.corners[place].place(self.looks, near, &Coming { arm, gap, velocity, curve }, law);
+        self.corners[place].place(self.looks, near, &Candidates { arm, gap, velocity, curve }, law);
         if self.surface.is_some() {
             self.feel_surface(place, gap, velocity, law);
         }

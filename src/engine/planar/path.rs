@@ -148,14 +148,14 @@ impl Pair {
         }
     }
 
-    /// Where a corner comes to a border before the share `first` of the way towards the solution, backward if `direction` is −1: the shares, lane and border.
+    /// Where a corner comes to a border before the share `first` of the way towards the solution, backward if `direction` is −1: the share, lane and border.
     #[inline(always)]
     fn leaves_before(&self, first: f64, direction: f64x2) -> Option<(f64, usize, usize)> {
         let way = [0, 1].map(|k| (self.to[k] - self.at[k]) * direction);
         let fall = self.borders.map(|border| -dot(border, way));
         let left = self.borders.map(|border| dot(border, self.at).fast_max(f64x2::ZERO));
         let before = [0, 1].map(|k| fall[k].simd_gt(f64x2::ZERO) & left[k].simd_lt(fall[k] * f64x2::splat(first)));
-        // So most are.
+        // Most corners do not.
         if !(before[0] | before[1]).any() {
             return None;
         }
