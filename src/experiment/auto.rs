@@ -18,16 +18,22 @@ use crate::words::{not_one_of, number};
 pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
 /// Times of records are multiples of this (s) or less.
 const GRID: f64 = 1e-4;
-/// The loosest tolerance, as a share of the robot's length and of the error that is allowed, and the factor to the next.
-const LOOSEST: f64 = 2e-6;
+/// The loosest tolerance, as a share of the robot's length for an allowed error of one, and the factor to the next. It goes with the power 3/2 of the error,
+/// for sums of local errors of third order go with the power 2/3 of the tolerance. Measured on 400 random experiments: with three times as much 95 % of the
+/// promises are kept, with this 98 %, and with a third of it too.
+const LOOSEST: f64 = 2e-3;
 const TIGHTER: f64 = 0.1;
+/// By how much less a result changes with the next tolerance, if it converges as local errors do.
+const FALL: f64 = 4.64;
 /// Runs with ever tighter tolerances.
-const RUNS: usize = 5;
+const RUNS: usize = 6;
+/// After the second and the third run it is seen whether the motion is chaotic, if the result changes by more than so many times what is allowed.
+const FAR: [f64; 2] = [5.0, 1.0];
 /// Steps of one run at most: this many, or those of so many per longest step if that is more.
 const MOST_STEPS: u64 = 2_000_000;
 const MOST_STEPS_OF_LONGEST: u64 = 500;
-/// Changes of all coefficients of friction that should change a result by nothing that can be seen.
-const PERTURBATIONS: [f64; 4] = [-2e-6, -1e-6, 1e-6, 2e-6];
+/// By this share all coefficients of friction are changed up and down, which should change a result by nothing that can be seen.
+const PERTURBATION: f64 = 2e-6;
 /// Values below this (mm, deg, Hz, –) are zero but for rounding.
 const ZERO: f64 = 1e-6;
 
@@ -153,12 +159,21 @@ pub(super) fn run(
             // Measures are not given, whatever the steps.
             return Ok(run);
         }
-        if let Some(change) = ladder.trials.last().and_then(|trial| trial.change).filter(|change| *change <= accuracy.error) {
+        let Some(change) = ladder.trials.last().and_then(|trial| trial.change) else { continue };
+        if change <= accuracy.error {
             return Ok(Run { step_choice: Some(ladder.choice(change, level, count)), ..run });
         }
+        let times = change / accuracy.error;
+        if let Some(far) = FAR.get(level - 1).filter(|far| first == 0 && times > **far)
+            && let Some(spread) = ladder.spread(experiment, level - 1, *far)
+        {
+            return Err(ladder.not_converged(&spread));
+        }
+        if level > FAR.len() && times > FALL.powi((RUNS - 1 - level) as i32) {
+            return Err(ladder.not_converged(&format!("it still changes by {change:.1e}")));
+        }
     }
-    let spread = if first == 0 { ladder.spread(experiment) } else { None };
-    Err(ladder.not_converged(&spread.unwrap_or_else(|| "a tighter tolerance would need steps below what rounding allows".into())))
+    Err(ladder.not_converged("tighter tolerances fail"))
 }
 
 /// The runs so far.
@@ -179,7 +194,7 @@ impl<'a> Ladder<'a> {
         let longest_steps = (experiment.steps.saturating_sub(first) as f64 * experiment.time_step / LONGEST) as u64;
         Self {
             accuracy,
-            loosest: LOOSEST * length * accuracy.error,
+            loosest: LOOSEST * length * accuracy.error.powf(1.5),
             most_steps: MOST_STEPS.max(longest_steps.saturating_mul(MOST_STEPS_OF_LONGEST)),
             trials: Vec::new(),
             last: None,
@@ -241,27 +256,28 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// What the measure spreads over when friction is changed by next to nothing, if that is more than is allowed.
-    fn spread(&self, experiment: &Experiment) -> Option<String> {
+    /// What the measure spreads over when friction is changed by next to nothing, with the tolerance of a run that was made, if that is more than `times` what is
+    /// allowed.
+    fn spread(&self, experiment: &Experiment, level: usize, times: f64) -> Option<String> {
         let name = self.accuracy.measure.as_deref()?;
         if experiment.robot.mount != Mount::Ground || experiment.engine != EngineKind::Planar {
             return None;
         }
-        let values: Vec<f64> = PERTURBATIONS
-            .iter()
-            .filter_map(|by| {
-                let mut other = experiment.clone();
-                other.robot.friction.ground *= 1.0 + by;
-                let mut engine = other.engine().ok()?;
-                let (run, _) = self.run(&other, 1, engine.as_mut(), |_| Control::Continue).ok()?;
-                run.measures.get(name)
-            })
-            .collect();
+        let perturbed = [-PERTURBATION, PERTURBATION].into_iter().filter_map(|by| {
+            let mut other = experiment.clone();
+            other.record_only_what_measures_need(&[name]);
+            other.robot.friction.ground *= 1.0 + by;
+            let mut engine = other.engine().ok()?;
+            let (run, _) = self.run(&other, level, engine.as_mut(), |_| Control::Continue).ok()?;
+            run.measures.get(name)
+        });
+        let values: Vec<f64> = self.trials[level].value.into_iter().chain(perturbed).collect();
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-        (values.len() > 1 && high - low > self.accuracy.error * low.abs().max(high.abs())).then(|| {
+        (values.len() > 1 && high - low > times * self.accuracy.error * low.abs().max(high.abs())).then(|| {
             format!(
-                "the motion is chaotic: when all friction changes by {:e} or less of itself, it spreads from {low:.5} to {high:.5}",
-                PERTURBATIONS[3]
+                "the motion is chaotic: when all friction changes by {PERTURBATION:e} of itself, it spreads from {low:.5} to {high:.5} with \
+                 local errors of {:.0e} cm",
+                self.tolerance(level)
             )
         })
     }

@@ -30,7 +30,7 @@ use crate::drive::{Drive, Waveform};
 use crate::effects::{Applied, Path};
 use crate::engine::{AffectedEngine, BulletEngine, Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::model::{Mount, Robot};
-use crate::recording::{GroundMeta, Meta};
+use crate::recording::{GroundMeta, Meta, definitions};
 
 /// A checked experiment in CGS units.
 ///
@@ -117,6 +117,16 @@ impl Experiment {
             }
         };
         Ok(if path.is_empty() { engine } else { Box::new(AffectedEngine::new(engine, path, self.time_step)) })
+    }
+
+    /// Leaves out records that `measures` do not come from, where nothing else is wanted of a run.
+    pub(crate) fn record_only_what_measures_need(&mut self, measures: &[impl AsRef<str>]) {
+        let path_counts = self.accuracy.as_ref().is_some_and(|accuracy| accuracy.measure.is_none());
+        let of_records = |name: &str| name == definitions::OF_RECORDS;
+        let needed = self.accuracy.iter().filter_map(|accuracy| accuracy.measure.as_deref());
+        if !path_counts && !measures.iter().map(AsRef::as_ref).chain(needed).any(of_records) {
+            self.record_every = self.steps.max(1);
+        }
     }
 
     /// Whether the state before step `step` is recorded: a multiple of the interval after the first regular record, or the first or last step. By

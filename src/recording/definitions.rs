@@ -49,7 +49,7 @@ pub static DEFINITIONS: &[Definition] = &[
     ),
     define("jump_height_mm", MOBILE, "max over time of min over nodes of z: height of the lowest point at its best"),
     define(
-        "recorded_jump_height_mm",
+        OF_RECORDS,
         MOBILE,
         "the same of the records alone, which may miss the moment: what a curve shows that was drawn from records, as the authors' are",
     ),
@@ -83,6 +83,9 @@ pub static DEFINITIONS: &[Definition] = &[
         "energy that nothing supplied, as a fraction of the largest mechanical energy",
     ),
 ];
+
+/// The measure that depends on what is recorded.
+pub(crate) const OF_RECORDS: &str = "recorded_jump_height_mm";
 
 const fn define(name: &'static str, of: &'static str, about: &'static str) -> Definition {
     Definition { name, of, about }

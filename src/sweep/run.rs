@@ -85,7 +85,8 @@ fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Result<
     if let Some(path) = sweep.changed(experiment.as_ref().ok()) {
         return Err(path);
     }
-    let run = experiment.map_err(|error| error.to_string()).and_then(|experiment| {
+    let run = experiment.map_err(|error| error.to_string()).and_then(|mut experiment| {
+        experiment.record_only_what_measures_need(&sweep.measures);
         let mut engine = experiment.engine().map_err(|error| error.to_string())?;
         let observe = |_| if given_up() { Control::Stop } else { Control::Continue };
         let run = experiment::run(&experiment, engine.as_mut(), observe).map_err(|error| error.to_string())?;
