@@ -363,6 +363,40 @@ fn a_dropped_box_stays_down() {
     assert!((weight / (mass * 980.0) - 1.0).abs() < 1e-6, "{weight}");
 }
 
+/// A robot that is put into the floor, flat or tilted about the end that is in it, comes out slowly, at all steps: 10⁻² cm/s, to within the penetration that is
+/// left alone, 10⁻⁵ cm. All corners between two bodies of a flat robot are two at one place.
+#[test]
+fn a_robot_that_starts_inside_the_floor_is_pushed_out_slowly() {
+    let experiment = passive("actuators = 5\nmotors_per_actuator = 3\nfriction = { low = 0.2, high = 4.0 }");
+    for (time_step, tilted) in [(1e-4, false), (1e-4, true), (1e-5, false)] {
+        let mut engine = engine(&experiment, time_step);
+        let bodies = 16;
+        let mut state = State::of(&engine, bodies);
+        let depth = 0.002;
+        state.centre()[1] -= depth;
+        if tilted {
+            // The right end is on the floor.
+            let length: f64 = experiment.robot.segments().iter().map(|segment| segment.length).sum();
+            state.angles().fill(2.0 * depth / length);
+        }
+        state.load(&mut engine);
+        let mut fastest = 0.0_f64;
+        for _ in 0..(0.5 / time_step) as u64 {
+            step(&mut engine);
+            fastest = fastest.max(State::of(&engine, bodies).centre()[3].abs());
+        }
+        let lowest = |engine: &mut PlanarEngine| {
+            let mut places = vec![[0.0; 2]; bodies + 1];
+            engine.places(&mut places).unwrap();
+            places.into_iter().map(|place| place[1]).fold(f64::INFINITY, f64::min)
+        };
+        assert!(fastest < 0.011, "{time_step} {tilted}: {fastest} cm/s");
+        let lowest = lowest(&mut engine);
+        assert!((-2e-5..1e-6).contains(&lowest), "{time_step} {tilted}: {lowest} cm");
+        assert!(engine.kinetic_energy().unwrap() < 1e-6, "{time_step} {tilted}: {:?}", engine.kinetic_energy());
+    }
+}
+
 /// Of steps that are cut where corners land, the parts' impulses are summed.
 #[test]
 fn the_floor_gives_what_gravity_takes() {

@@ -12,6 +12,7 @@ mod planar;
 pub use affected::AffectedEngine;
 pub use bullet::BulletEngine;
 pub use energy::{Books, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
+pub(crate) use planar::NUMERICAL_DAMPING;
 pub use planar::{FrictionModel, PlanarEngine};
 
 use thiserror::Error;

@@ -1,9 +1,9 @@
 //! Steps that adapt to the motion, so that the error of each one stays below a tolerance.
 //!
-//! A step is taken in two halves of length h. Taken whole it would end elsewhere: where nothing happens by h³/2 of the third derivative of the places. That
-//! distance of the nodes is its local error, and the next step is as long as the error says, up to 1 ms. The third derivative is that of the mean velocities
-//! over both halves and over the half step before. Velocities at single times would not do: those that springs and dampers dictate may alternate. Where
-//! the half step before says nothing, after an impact and where voltages jump, the step is taken whole, too.
+//! A step is taken in two halves of length h. Taken whole it would end elsewhere: where nothing happens by h³/2 (x⃛ + 12 D ẍ), with the places x of the nodes and the
+//! numerical damping D. The largest such distance is its local error, and the next step is as long as the error says, up to 1 ms. Derivatives are those of the
+//! mean velocities over both halves and over the half step before. Velocities at single times would not do: those that springs and dampers dictate may
+//! alternate. Where the half step before says nothing, after an impact and where voltages jump, the step is taken whole, too.
 //!
 //! The error of a corner that lands within a step is its velocity times h. So steps end where the next corner lands: the landing is foreseen from
 //! heights and velocities, again and again as it comes nearer, and then one very short step, twice as long as what is left, takes the impact at once
@@ -23,7 +23,7 @@
 
 use super::Experiment;
 use super::run::{Control, Observation, Run, Supply, sample_every};
-use crate::engine::{Engine, EngineError};
+use crate::engine::{Engine, EngineError, NUMERICAL_DAMPING};
 use crate::model::Mount;
 
 /// The longest step (s).
@@ -92,6 +92,7 @@ pub(super) fn run(
         impacts: 0,
         wanted: LONGEST,
         half_before: None,
+        damping: experiment.numerical_damping.unwrap_or(NUMERICAL_DAMPING),
         every,
         next_sample: done + every,
         next_record: done + 1,
@@ -138,6 +139,8 @@ struct AdaptiveRun<'a> {
     wanted: f64,
     /// Half of the step before (s), if accelerations go on from it.
     half_before: Option<f64>,
+    /// Weight of a step's end less ½, per length of the step (1/s).
+    damping: f64,
     observation: Observation<'a>,
     supply: Supply<'a>,
     /// In steps of the experiment: how far regular samples are apart and the next one; the next that may be recorded.
@@ -293,15 +296,17 @@ impl AdaptiveRun<'_> {
             None => largest(whole.iter().zip(end).map(|(a, b)| a - b)),
             Some(length) => {
                 let h = half.length;
-                let (per_half, per_before, per_mean) = (1.0 / h, 1.0 / length, 2.0 / (h + length));
-                let places = before.iter().zip(start).zip(middle.iter().zip(end));
-                let bends = places.map(|((a, b), (c, d))| {
-                    let [u, v, w] = [(b - a) * per_before, (c - b) * per_half, (d - c) * per_half];
-                    (w - v) * per_half - (v - u) * per_mean
-                });
-                // Accelerations in the middle of the step and halfway between the centres of the half before and the first half.
+                // Between the middle of the step and halfway between the centres of the half before and of the first half.
                 let apart = 0.25 * (3.0 * h + length);
-                0.5 * h * h * h / apart * largest(bends)
+                let (per_half, per_before, per_mean, per_apart) = (1.0 / h, 1.0 / length, 2.0 / (h + length), 1.0 / apart);
+                let places = before.iter().zip(start).zip(middle.iter().zip(end));
+                let errors = places.map(|((a, b), (c, d))| {
+                    let [u, v, w] = [(b - a) * per_before, (c - b) * per_half, (d - c) * per_half];
+                    let (acceleration, acceleration_before) = ((w - v) * per_half, (v - u) * per_mean);
+                    let third = (acceleration - acceleration_before) * per_apart;
+                    third.abs() + 12.0 * self.damping * acceleration.abs()
+                });
+                0.5 * h * h * h * largest(errors)
             }
         })
     }

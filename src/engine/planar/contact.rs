@@ -74,6 +74,8 @@ pub(super) struct Law {
     /// 1/R (g).
     stiffness: f64,
     stiffness_of_impacts: f64,
+    /// Whether the step is an impact, or too short for anything else to happen in it.
+    pub(super) is_instant: bool,
     frictionless: bool,
     pub(super) friction: FrictionModel,
 }
@@ -96,8 +98,8 @@ impl Law {
         [self.per_ahead, self.per_ahead_fast, self.per_ahead_landing] =
             [slow, fast, landing].map(|ahead| 1.0 / (0.5 * time_step + ahead));
         self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
-        let is_impact = fast == 0.0 || time_step <= INSTANT;
-        self.stiffness = self.stiffness_of_impacts * if is_impact { 1.0 } else { time_step / STEP_OF_SOFTNESS };
+        self.is_instant = fast == 0.0 || time_step <= INSTANT;
+        self.stiffness = self.stiffness_of_impacts * if self.is_instant { 1.0 } else { time_step / STEP_OF_SOFTNESS };
     }
 
     /// Open corners with these gaps in the step's middle (cm) and velocities along z (cm/s), if they go on so, that cut the step where they land: those
@@ -143,6 +145,7 @@ impl Law {
             weight,
             stiffness: body_mass / SOFTNESS,
             stiffness_of_impacts: body_mass / SOFTNESS,
+            is_instant: false,
             frictionless: false,
             friction,
         }
@@ -163,6 +166,7 @@ impl Law {
             weight: 1.0,
             stiffness,
             stiffness_of_impacts: stiffness,
+            is_instant: false,
             frictionless: true,
             friction,
         }

@@ -76,7 +76,7 @@ pub(super) const LARGEST_FRICTION: f64 = 10.0;
 /// The weight of a step's end over that of its start is 1/2 + this (1/s) times the step, so that what alternates from step to step dies out:
 /// a velocity that springs and dampers dictate keeps −(1 − w)/w of an alternation per step. For a mode of angular frequency ω this adds
 /// h (w − 1/2) ω/2 to the damping ratio, of second order in h.
-const NUMERICAL_DAMPING: f64 = 50.0;
+pub(crate) const NUMERICAL_DAMPING: f64 = 50.0;
 /// The links' directions are computed anew every so many steps, for turning them on loses a last digit at times.
 const EXACT_EVERY: u64 = 256;
 

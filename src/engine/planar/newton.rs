@@ -35,7 +35,7 @@ const DONE_OF_KINETIC: f64 = 1e-18;
 /// Under Coulomb's law, which has no cost to lower, Newton's method may go in circles. After so many steps a path is followed instead ([`path`](super::path)).
 /// Measured: in 3 % of the steps of a robot that jumps; with one or three steps before it, runs take longer.
 const BEFORE_PATH: u32 = 2;
-/// How often contact is made softer in a step that is not solved. Seen: once, in steps of 2·10⁻¹⁰ s.
+/// How often contact is made softer in an impact, or in an instant, that is not solved. Seen: once, in steps of 2·10⁻¹⁰ s.
 const SOFTENINGS: u32 = 2;
 /// Parts of a long chain, which a path does not go through, are left after so many.
 const COULOMB_STEPS_IN_PART: u32 = 8;
@@ -93,10 +93,10 @@ impl PlanarEngine {
             if done {
                 return Ok(steps);
             }
-            if law.friction == FrictionModel::Convex {
+            if law.friction == FrictionModel::Convex || !law.is_instant {
                 break;
             }
-            // Impulses so small that rounding hides what they take to give way.
+            // Impulses so small that rounding hides what they take to give way. In longer steps softer contact would be another robot.
             law.soften();
         }
         let time = self.step as f64 * self.time_step;
