@@ -367,10 +367,10 @@ fn a_dropped_box_stays_down() {
 /// left alone, 10⁻⁵ cm. All corners between two bodies of a flat robot are two at one place.
 #[test]
 fn a_robot_that_starts_inside_the_floor_is_pushed_out_slowly() {
-    let experiment = passive("actuators = 5\nmotors_per_actuator = 3\nfriction = { low = 0.2, high = 4.0 }");
+    let experiment = passive("actuators = 1\nmotors_per_actuator = 5\nfriction = { low = 0.2, high = 4.0 }");
     for (time_step, tilted) in [(1e-4, false), (1e-4, true), (1e-5, false)] {
         let mut engine = engine(&experiment, time_step);
-        let bodies = 16;
+        let bodies = 6;
         let mut state = State::of(&engine, bodies);
         let depth = 0.002;
         state.centre()[1] -= depth;
