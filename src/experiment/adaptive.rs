@@ -45,8 +45,8 @@ const SAFETY: f64 = 0.9;
 /// Least and largest factor from one step to the next.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 4.0;
-/// Share of the step before an impact or a jump of voltages that is tried after it. Measured: steps of one half to one tenth need 3 to 7 % fewer solutions in
-/// all than whole ones.
+/// Share of the step before an impact or a jump of voltages that is tried after it. Measured: with a half 4 %, with a fifth or a tenth 7 % fewer steps are solved in
+/// all than with the whole.
 const ANEW: f64 = 0.2;
 
 /// How many steps a run took, halves and rejected ones included, and the shortest and longest that were kept (s).

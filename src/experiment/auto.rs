@@ -19,7 +19,7 @@ pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
 /// Times of records are multiples of this (s) or less.
 const GRID: f64 = 1e-4;
 /// The loosest tolerance, as a share of the robot's length for an allowed error of one, the least such share to begin with, and the factor to the next. On the
-/// floor results err with about the square root of the tolerance (measured: 2.5 to 3 times less with a tenth), so it goes with the square of the error.
+/// floor results err with about the square root of the tolerance (measured: 2 to 3 times less with a tenth), so it goes with the square of the error.
 const LOOSEST: f64 = 0.02;
 const FINEST: f64 = 1e-11;
 const TIGHTER: f64 = 0.1;
