@@ -96,6 +96,8 @@ impl Floor {
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
         let [mut moving, mut bending] = root.map(|part| part.map(f64x2::splat));
+        // Levels that the accelerations have been carried along: as far as corners are near, which seldom is to the tips.
+        let mut carried = 0;
         for k in 0..rungs {
             let quad = &quads[k / 2];
             let (along, across) = (pair(&quad.along, k % 2), pair(&quad.across, k % 2));
@@ -107,7 +109,12 @@ impl Floor {
             let near = |x: f64x2, z: f64x2| (at + z).simd_lt(fma(-step, fma(rate, x, moving[1]), reach));
             let (inner, outer) = (near(x, z), near(outer_x, outer_z));
             if (inner | outer).any() {
-                // Most rungs are not: what only these need is made here.
+                // Most levels are not: what only these need is made here.
+                for level in carried..k {
+                    let (across, rate) = (pair(&quads[level / 2].across, level % 2), quads[level / 2].motion[0].rung(level % 2));
+                    bending = [0, 1].map(|axis| next(bending[axis], -rate * (rate * across[axis]), level));
+                }
+                carried = k;
                 let from = Reference {
                     gap: at,
                     velocity: moving,
@@ -119,9 +126,7 @@ impl Floor {
                 self.place(2 * k + 1, outer, [outer_x, outer_z], &from, law);
             }
             at = next(at, across[1], k);
-            let turned = [rate * across[1], rate * across[0]];
-            moving = [next(moving[0], -turned[0], k), next(moving[1], turned[1], k)];
-            bending = [next(bending[0], -rate * turned[1], k), next(bending[1], -rate * turned[0], k)];
+            moving = [next(moving[0], -(rate * across[1]), k), next(moving[1], rate * across[0], k)];
         }
         !self.near.is_empty()
     }
