@@ -46,7 +46,7 @@ fn a_mover_on_rough_films_is_within_a_percent_of_very_short_steps_at_every_delay
         let choice = found.step_choice.unwrap();
         assert!(choice.change <= 1e-3 && choice.measure == "displacement_sum_mm", "{choice:?}");
         let sum = found.measures.displacement_sum_mm.unwrap();
-        // Seen: at most 2·10⁻⁴.
+        // Seen: at most 3·10⁻⁴.
         assert!((sum / converged - 1.0).abs() < 2e-3, "{delay_s}: {sum}, {converged}, {choice:?}");
         assert!(found.measures.energy_error.unwrap() < 1e-6, "{:?}", found.energy);
         let steps: u64 = choice.trials.iter().map(|trial| trial.steps).sum();
@@ -82,14 +82,27 @@ fn no_step_is_promised_on_a_false_plateau() {
     }
 }
 
+/// With local errors of 10⁻⁷ and 10⁻⁸ cm the stride is −2.311 and −2.309 mm, after −2.367 mm: two runs that agree by chance. Fixed steps from 10⁻⁴ to
+/// 5·10⁻⁷ s give −2.346 to −2.354 mm.
+#[test]
+fn agreement_after_a_large_change_is_confirmed() {
+    let found = run(&preset("inchworm", &["simulation.step_measure=stride_mm"]));
+    let stride = found.measures.stride_mm.unwrap();
+    assert!((-2.36..-2.34).contains(&stride), "{stride}: {:?}", found.step_choice);
+}
+
 /// A flat robot without voltages on a slope α slides by ½ g (sin α − μ cos α) t² if that is steeper than the friction angle, and stays otherwise.
 #[test]
 fn a_robot_slides_down_a_slope_as_a_block_does() {
-    for (degrees, friction, slides) in [(20.0, 0.2, true), (30.0, 0.0, true), (20.0, 0.5, false), (20.0, 5.0, false)] {
+    let cases = [(20.0, 0.2, true), (30.0, 0.0, true), (20.0, 0.5, false), (20.0, 5.0, false)];
+    // By default steps of 1 ms, whose numerical damping shows: 2.4·10⁻⁵ cm.
+    for ((degrees, friction, slides), (step_error, allowed)) in
+        cases.into_iter().flat_map(|case| [(1e-3, 1e-5), (1e-4, 2e-6)].map(|promise| (case, promise)))
+    {
         let text = format!(
             "[robot]\nactuators = 2\nfriction = {{ low = {friction}, film = \"none\" }}\n[[effect]]\nid = \"ground-slope\"\nangle_deg = {degrees}\n\
              [drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0]\n[simulation]\nengine = \"planar\"\nstart = \"settled\"\ntime_step_s = \"auto\"\n\
-             step_error = 1e-4\nduration_s = 0.2\nrecord_every_s = 0.01\n"
+             step_error = {step_error}\nduration_s = 0.2\nrecord_every_s = 0.01\n"
         );
         let found = run(&read(&text)).recording;
         let (rows, width) = (found.time.len(), 3 * found.nodes());
@@ -97,7 +110,10 @@ fn a_robot_slides_down_a_slope_as_a_block_does() {
         let moved = found.positions[(rows - 1) * width] - found.positions[0];
         let angle = f64::to_radians(degrees);
         let expected = if slides { -0.5 * 980.0 * (angle.sin() - friction * angle.cos()) * time * time } else { 0.0 };
-        assert!((moved - expected).abs() < 2e-6 * (1.0 + expected.abs()), "{degrees} {friction}: {moved}, {expected}");
+        assert!(
+            (moved - expected).abs() < allowed * (1.0 + expected.abs()),
+            "{degrees} {friction} {step_error}: {moved}, {expected}"
+        );
     }
 }
 

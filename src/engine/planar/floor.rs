@@ -85,9 +85,9 @@ impl Floor {
     }
 
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and with this velocity
-    /// (cm/s) and acceleration at constant rates (cm/s²); whether any does. Lanes without mass have no corners.
+    /// (cm/s) and acceleration at constant rates (cm/s²). Lanes without mass have no corners.
     #[inline(always)]
-    pub(super) fn find(&mut self, quads: &[Quad], rungs: usize, height: f64, root: [[f64; 2]; 2], law: &Law) -> bool {
+    pub(super) fn find(&mut self, quads: &[Quad], levels: usize, height: f64, root: [[f64; 2]; 2], law: &Law) {
         self.near.clear();
         self.looks += 1;
         self.landing = f64::INFINITY;
@@ -98,7 +98,7 @@ impl Floor {
         let [mut moving, mut bending] = root.map(|part| part.map(f64x2::splat));
         // Levels that the accelerations have been carried along: as far as corners are near, which seldom is to the tips.
         let mut carried = 0;
-        for k in 0..rungs {
+        for k in 0..levels {
             let quad = &quads[k / 2];
             let (along, across) = (pair(&quad.along, k % 2), pair(&quad.across, k % 2));
             let rate = quad.motion[0].rung(k % 2);
@@ -128,7 +128,6 @@ impl Floor {
             at = next(at, across[1], k);
             moving = [next(moving[0], -(rate * across[1]), k), next(moving[1], rate * across[0], k)];
         }
-        !self.near.is_empty()
     }
 
     /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor. The links point `along`, and the root's

@@ -56,12 +56,12 @@ enum Search {
 }
 
 impl PlanarEngine {
-    /// Finds the corners that may touch during the step; whether any does.
+    /// Finds the corners that may touch during the step.
     #[inline(always)]
-    pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &Law) -> bool {
-        self.mount == Mount::Ground && {
+    pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &Law) {
+        if self.mount == Mount::Ground {
             let (height, motion) = self.root_over_floor(simd);
-            self.floor.find(&self.quads, self.rungs, height, motion, law)
+            self.floor.find(&self.quads, self.rungs, height, motion, law);
         }
     }
 
