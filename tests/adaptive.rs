@@ -57,12 +57,17 @@ fn a_mover_on_rough_films_is_within_a_percent_of_very_short_steps_at_every_delay
 /// Against fixed steps of 5·10⁻⁶ s, where a robot jumps on friction 1 and where a clamped one swings.
 #[test]
 fn the_automatic_step_keeps_its_promise() {
-    for (name, measure, error) in [("jump-14hz", "jump_height_mm", 0.01), ("cantilever-step", "tip_amplitude_mm", 0.001)] {
+    let jumping = ["drive.frequency_hz=20", "simulation.duration_s=1.2"];
+    for (name, of, measure, error) in [
+        ("jump-14hz", jumping, "jump_height_mm", 0.01),
+        ("jump-14hz", jumping, "jump_height_mm", 0.001),
+        ("cantilever-step", ["simulation.duration_s=0.2"; 2], "tip_amplitude_mm", 0.001),
+    ] {
         let settings = [format!("simulation.step_error={error}"), format!("simulation.step_measure={measure}")];
-        let automatic = run(&preset(name, &["simulation.duration_s=0.2", &settings[0], &settings[1]]));
+        let automatic = run(&preset(name, &[of[0], of[1], &settings[0], &settings[1]]));
         assert!(automatic.step_choice.as_ref().unwrap().change <= error);
         let mut fixed = Source::from_text(name, presets::find(name).unwrap().text);
-        for setting in ["simulation.engine=planar", "simulation.time_step_s=5e-6", "simulation.duration_s=0.2"] {
+        for setting in ["simulation.engine=planar", "simulation.time_step_s=5e-6", of[0], of[1]] {
             fixed.set(setting).unwrap();
         }
         let fine = run(&experiment::experiment(&fixed).unwrap());
@@ -134,6 +139,41 @@ fn records_change_nothing() {
         same += 1;
     }
     assert!(same >= 10, "{same}");
+}
+
+/// Measures of whole periods are over the same periods however long the steps, also where the run's half is a whole number of them.
+#[test]
+fn measures_of_periods_do_not_depend_on_how_a_run_is_stepped() {
+    let settings = ["drive.frequency_hz=14", "simulation.duration_s=3", "simulation.step_measure=speed_mm_s"];
+    let adaptive = run(&preset("full-frictional-inchworm", &settings)).measures;
+    let mut source = Source::from_text("fixed", presets::find("full-frictional-inchworm").unwrap().text);
+    for setting in [&settings[..2], &["simulation.engine=planar", "simulation.time_step_s=2e-5"]].concat() {
+        source.set(setting).unwrap();
+    }
+    let fixed = run(&experiment::experiment(&source).unwrap()).measures;
+    let [speeds, strides] = [adaptive.speed_mm_s.zip(fixed.speed_mm_s), adaptive.stride_mm.zip(fixed.stride_mm)];
+    for (a, b) in [speeds.unwrap(), strides.unwrap()] {
+        // Steps of 2e-5 s err by half a percent.
+        assert!((a / b - 1.0).abs() < 1e-2, "{a} {b}");
+    }
+    assert_eq!((adaptive.period_ratio, fixed.period_ratio), (Some(2.0), Some(2.0)));
+}
+
+#[test]
+fn records_are_as_far_apart_as_asked() {
+    let every = 2.0 / 1920.0;
+    let spaced = |duration: &str| {
+        let settings = [&format!("simulation.record_every_s={every}"), duration, "simulation.step_measure=jump_height_mm"];
+        run(&preset("jump-on-time", &settings))
+    };
+    let run = spaced("simulation.duration_s=0.2");
+    let times = &run.recording.time;
+    let regular = &times[..times.len() - 1];
+    assert!(regular.len() >= 190, "{}", regular.len());
+    assert!(regular.iter().enumerate().all(|(k, time)| (time - k as f64 * every).abs() < 1e-12), "{times:?}");
+    // Where the spacing does not go into the duration, the duration counts, and records are as near as a tenth of a millisecond allows.
+    let times = spaced("simulation.duration_s=0.0503").recording.time;
+    assert!((times[2] - times[1] - every).abs() < 5e-5, "{times:?}");
 }
 
 #[test]

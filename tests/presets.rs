@@ -205,7 +205,10 @@ fn every_number_of_the_reproduction_says_which_engine_it_is_of() {
         let heads: Vec<String> = section.descendants().filter(|n| n.has_tag_name("th")).map(pages::text).collect();
         assert_eq!(heads[2..5], ["ours (planar engine)", "difference", "spot check (Bullet)"]);
         let engines = section.descendants().find(|n| pages::has_class(n, "engines")).map(pages::text).unwrap();
-        assert!(engines.contains("planar engine, time step 20 µs") && engines.contains("Bullet, time step"), "{engines}");
+        assert!(
+            engines.contains("planar engine, steps that adapt to 1 % of the result") && engines.contains("Bullet, time step"),
+            "{engines}"
+        );
     }
     for result in results["results"].as_array().unwrap() {
         let rows = result["comparisons"].as_array().unwrap();

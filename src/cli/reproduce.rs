@@ -24,7 +24,7 @@ pub struct Args {
     /// Folder of the results.
     #[arg(long, value_name = "DIR", required_unless_present = "list")]
     out: Option<PathBuf>,
-    /// With steps five times as long as without.
+    /// Results to 1 % instead of 0.1 %.
     #[arg(long)]
     quick: bool,
     /// Number of runs at a time; by default one per processor.

@@ -355,8 +355,9 @@ impl AdaptiveRun<'_> {
         let extremes = self.experiment.robot.mount != Mount::Clamped;
         let first = self.next_sample;
         for (place, until) in [(MIDDLE, from + 0.5 * length), (END, from + length)] {
-            let mut last = f64::NAN;
-            while self.next_sample as f64 * grid <= until {
+            let mut last = f64::NEG_INFINITY;
+            // A run ends within a sliver of its end.
+            while self.next_sample as f64 * grid <= until + SLIVER {
                 last = self.next_sample as f64 * grid;
                 let share = (last - from) / length;
                 let weights = [(1.0 - share) * (1.0 - 2.0 * share), 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)];
@@ -367,7 +368,7 @@ impl AdaptiveRun<'_> {
                 self.observation.take_sample(last, true, engine.motor_voltages());
                 self.next_sample = self.after(self.next_sample);
             }
-            if extremes && last != until {
+            if extremes && last < until {
                 self.observation.accumulator.places().copy_from_slice(&self.nodes[place]);
                 self.observation.take_sample(until, false, engine.motor_voltages());
             }
@@ -386,7 +387,7 @@ impl AdaptiveRun<'_> {
         let grid = self.experiment.time_step;
         let (middle, end) = (stretch.from + 0.5 * stretch.length, stretch.from + stretch.length);
         let mut aside = false;
-        while self.next_record < self.experiment.steps && self.next_record as f64 * grid <= end {
+        while self.next_record < self.experiment.steps && self.next_record as f64 * grid <= end + SLIVER {
             let at = self.next_record as f64 * grid;
             if self.experiment.records(self.next_record) {
                 if !aside {

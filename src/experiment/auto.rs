@@ -98,11 +98,8 @@ pub(super) fn resolve(config: &Config, resolve: impl Fn(&Config) -> Result<Exper
     let Some(duration) = s.duration_s else {
         return Err(Fault::new("simulation.duration_s", "is missing; time_step_s = \"auto\" does not go with steps").into());
     };
-    // Parts of the duration and of the longest step, whatever is recorded; a duration that is none is told by what comes.
-    let longest = duration / (duration / LONGEST).ceil();
-    let record = s.record_every_s.filter(|every| *every > 0.0).unwrap_or(GRID).min(GRID);
     let mut fixed = config.clone();
-    fixed.simulation.time_step_s = Some(StepConfig::Seconds(longest / (longest / record).ceil()));
+    fixed.simulation.time_step_s = Some(StepConfig::Seconds(record_grid(duration, s.record_every_s)));
     (fixed.simulation.step_error, fixed.simulation.step_measure) = (None, None);
     let mut experiment = resolve(&fixed)?;
     if experiment.robot.mount == Mount::Ground && experiment.friction == FrictionModel::Convex {
@@ -114,9 +111,24 @@ pub(super) fn resolve(config: &Config, resolve: impl Fn(&Config) -> Result<Exper
         let message = "auto does not go with the effect discretisation's time_step_scale";
         return Err(Fault::new("simulation.time_step_s", message).into());
     }
+    if s.record_from_step.is_none() {
+        // The reference's records are a step before the multiples of their interval, which is nothing with short steps.
+        experiment.record_from = experiment.record_every.min(experiment.steps - 1);
+    }
     experiment.accuracy = Some(Accuracy { measure: s.step_measure.clone(), error });
     experiment.config = config.clone();
     Ok(experiment)
+}
+
+/// Time (s) of which all times of records are multiples, [`GRID`] or less: a part of the duration, and of the time between records if that goes into the duration.
+/// Values that are none are told by the check of the experiment.
+fn record_grid(duration: f64, every: Option<f64>) -> f64 {
+    let every = every.filter(|every| *every > 0.0);
+    let goes_into_duration = |part: &f64| (duration / part - (duration / part).round()).abs() < 1e-6;
+    every.map(|every| every / (every / GRID).ceil()).filter(goes_into_duration).unwrap_or_else(|| {
+        let longest = duration / (duration / LONGEST).ceil();
+        longest / (longest / every.unwrap_or(GRID).min(GRID)).ceil()
+    })
 }
 
 /// What a run gives to compare.

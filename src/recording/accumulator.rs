@@ -113,7 +113,7 @@ impl SamplingPlan {
 
     /// When the last half begins in whole periods, at least one.
     fn half(&self, period: f64) -> Option<f64> {
-        self.periods_before_end(period, ((self.last - self.first) / 2.0 / period).floor().max(1.0))
+        self.periods_before_end(period, whole_periods((self.last - self.first) / 2.0, period).max(1.0))
     }
 
     /// Whether the samples follow what happens within a period.
@@ -130,10 +130,15 @@ impl SamplingPlan {
     /// began one or two periods before.
     fn repetition(&self, period: f64) -> Option<Repetition> {
         let duration = self.last - self.first;
-        let pairs = (duration / 4.0 / period).floor();
+        let pairs = whole_periods(duration / 4.0, period);
         let enough = self.resolves(period) && pairs >= 1.0 && 2.0 * period * (pairs + 1.0) <= duration * (1.0 + 1e-9);
         enough.then(|| Repetition::new(period, pairs as usize, [self.first, self.last], self.nodes))
     }
+}
+
+/// Number of whole periods in a time (s). The last sample of a run of fixed steps is a step before its end, so a hundredth of a period may lack.
+fn whole_periods(time: f64, period: f64) -> f64 {
+    (time / period + 0.01).floor()
 }
 
 impl MeasureAccumulator {
@@ -376,7 +381,7 @@ impl Mobile {
             let [middle, ends] = heights.phases_deg();
             measures.mid_end_phase_deg = middle.zip(ends).map(|(middle, ends)| phase_difference_deg(middle, ends));
         }
-        measures.period_ratio = self.repetition.as_ref().map(|repetition| {
+        measures.period_ratio = self.repetition.as_ref().filter(|repetition| repetition.is_complete()).map(|repetition| {
             let same = |periods: usize| repetition.of(periods).is_some_and(|r| r < SAME);
             if same(1) {
                 1.0

@@ -297,13 +297,17 @@ impl Repetition {
         self.taken += 1;
     }
 
+    /// Whether the motion has come to its end.
+    pub fn is_complete(&self) -> bool {
+        self.taken > self.points + 2 * POINTS
+    }
+
     /// r for 1 or 2 `periods`; `None` if the motion has not come to its end, or nothing moves.
     pub fn of(&self, periods: usize) -> Option<f64> {
         let n = self.points as f64;
         let spread: f64 = self.sums.iter().map(|[sum, squares]| squares - sum * sum / n).sum();
         let rounding = 1e-12 * self.sums.iter().map(|[_, squares]| squares).sum::<f64>();
-        let complete = self.taken > self.points + 2 * POINTS;
-        (complete && spread > rounding).then(|| (self.changes[periods - 1] / (2.0 * spread)).sqrt())
+        (self.is_complete() && spread > rounding).then(|| (self.changes[periods - 1] / (2.0 * spread)).sqrt())
     }
 }
 

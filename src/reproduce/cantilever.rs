@@ -29,7 +29,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
         // One line for all voltages, broken between them: a set is one entry of the legend.
         let mut shapes = Vec::new();
         for volts in [0, -600, -800, -1000] {
-            let (experiment, run) = bench.run("cantilever-dc", &[set, &format!("drive.voltages_v=[{volts}]")])?;
+            let (_, run) = bench.run("cantilever-dc", None, &[set, &format!("drive.voltages_v=[{volts}]")])?;
             let r = &run.recording;
             shapes.extend(shape(r, r.len() - 1));
             left = shapes[0].0;
@@ -46,7 +46,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
                 let (there, spot) = bench.run_on_bullet("cantilever-dc", &[set, "drive.voltages_v=[-1000]"])?;
                 let bullet = spot.measures.tip_deflection_mm.unwrap_or(f64::NAN);
                 findings.check_on_bullet("mm", tip, bullet);
-                findings.done_on(&experiment, Some(there.time_step));
+                findings.done_on(bench.effort, there.time_step);
             }
         }
         figure.series(&format!("planar engine, {name}"), shapes, Mark::Line);
@@ -88,7 +88,7 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
             let mut three = sweep.clone();
             three.axes[axis - 1].values.retain(|m| m.as_integer() == Some(3));
             spots = bench.spots(&id, &three, SPOTS_STEP, &SPOTS_HZ)?;
-            findings.done_on(&sweep.experiment(0)?, Some(SPOTS_STEP));
+            findings.done_on(bench.effort, SPOTS_STEP);
         }
         let chains: Vec<_> = sweep.axes[axis - 1].values.iter().filter_map(toml::Value::as_integer).collect();
         for (block, m) in points.chunks(sweep.axes[axis].values.len()).zip(chains) {
@@ -157,7 +157,7 @@ pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {
     let mut figure = Figure::new("Step response of the cantilever", "time (ms)", "height of the tip (mm)");
     figure.setting("0 to −1500 V at once, m = 3, set 2").size(WHOLE);
     for eta in [0.008, 0.03, 0.045] {
-        let (experiment, run) = bench.run("cantilever-step", &[&format!("robot.damping_eta={eta}")])?;
+        let (experiment, run) = bench.run("cantilever-step", None, &[&format!("robot.damping_eta={eta}")])?;
         let r = &run.recording;
         let tip = (0..r.len()).map(|i| (1e3 * r.time[i], 10.0 * r.node(i, r.nodes() - 1)[2]));
         figure.series(&format!("planar engine, dampingEta {eta}"), tip, Mark::Line);
@@ -184,7 +184,7 @@ pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {
             let (there, spot) = bench.run_on_bullet("cantilever-step", &[&format!("robot.damping_eta={eta}")])?;
             let bullet = spot.measures.resonance_hz.unwrap_or(f64::NAN);
             findings.check_on_bullet("Hz", measures.resonance_hz.unwrap_or(f64::NAN), bullet);
-            findings.done_on(&experiment, Some(there.time_step));
+            findings.done_on(bench.effort, there.time_step);
         }
     }
     findings.figure = figure.svg();

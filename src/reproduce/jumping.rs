@@ -31,8 +31,11 @@ const ON_TIME_RECORDS: &str = "simulation.record_every_s=1.0416666666666667e-3";
 /// 1.2 s at 14 Hz, and its measures.
 fn jump(bench: &Bench, bullet: bool) -> Result<(Experiment, Recording, Measures), StudyError> {
     let settings = [REAL[0], REAL[1], "simulation.duration_s=1.2", RECORDS];
-    let (experiment, run) =
-        if bullet { bench.run_on_bullet("jump-14hz", &settings)? } else { bench.run("jump-14hz", &settings)? };
+    let (experiment, run) = if bullet {
+        bench.run_on_bullet("jump-14hz", &settings)?
+    } else {
+        bench.run("jump-14hz", Some("jump_height_mm"), &settings)?
+    };
     Ok((experiment, run.recording, run.measures))
 }
 
@@ -80,10 +83,10 @@ fn beside_measured(height: f64) -> String {
 }
 
 pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
-    let (experiment, recording, measures) = jump(bench, false)?;
+    let (_, recording, measures) = jump(bench, false)?;
     let (there, spot_recording, spot) = jump(bench, true)?;
     let mut findings = Findings::default();
-    findings.done_on(&experiment, Some(there.time_step));
+    findings.done_on(bench.effort, there.time_step);
     let height = measures.jump_height_mm.unwrap_or(f64::NAN);
     findings.compare(
         HEIGHT,
@@ -148,10 +151,10 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
 }
 
 pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
-    let (experiment, recording, _) = jump(bench, false)?;
+    let (_, recording, _) = jump(bench, false)?;
     let (there, spot_recording, _) = jump(bench, true)?;
     let mut findings = Findings::default();
-    findings.done_on(&experiment, Some(there.time_step));
+    findings.done_on(bench.effort, there.time_step);
     let (found, on_bullet) = (best_moments(&recording), best_moments(&spot_recording));
     let mut figure = Figure::new("Key shapes of in-place jumping at 14 Hz", "x (mm)", "z (mm)");
     figure.setting("planar engine, (300, 300, −1500, 300, 300) V").size(WHOLE);
@@ -204,11 +207,11 @@ fn best_moments(recording: &Recording) -> [(ContactState, Option<usize>); 3] {
 
 pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
     let settings = [REAL[0], REAL[1], RECORDS];
-    let (sweep, points) = bench.sweep_of_runs("jump-frequency", "jump-frequency-scan", &settings)?;
+    let (sweep, points) = bench.sweep("jump-frequency", "jump-frequency-scan", &settings)?;
     let heights = curve(&sweep, &points, sweep.axes.len() - 1, 0);
     let bullet = bench.spots("jump-frequency", &sweep, SPOTS_STEP, &SPOTS_HZ)?;
     let mut findings = Findings::default();
-    findings.done_on(&sweep.experiment(0)?, Some(SPOTS_STEP));
+    findings.done_on(bench.effort, SPOTS_STEP);
     let best =
         heights.iter().copied().filter(|p| p.1.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((f64::NAN, f64::NAN));
     findings.compare(
@@ -267,7 +270,7 @@ pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
     let (their_top, our_top) = (top(&mut theirs.iter().copied()), top(&mut common.iter().map(|&(t, _, z)| (t, z))));
     let fine_top = top(&mut ours.iter().copied());
     let mut findings = Findings::default();
-    findings.done_on(&sweep.experiment(0)?, Some(ON_TIME_STEP));
+    findings.done_on(bench.effort, ON_TIME_STEP);
     findings.compare(
         &format!("height over on-time, {} of {} points", common.len(), theirs.len()),
         "the authors' simulated curve, read off to ±0.03 mm",

@@ -28,10 +28,20 @@ const PUBLISHED: &str = "#777777";
 /// How carefully a study is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
-    /// Single runs by 2·10⁻⁵ s, scans at their presets' steps.
+    /// Every result to 1 %.
     Quick,
-    /// At a fifth of these steps.
+    /// To 0.1 %.
     Full,
+}
+
+impl Effort {
+    /// What a tighter tolerance of the adaptive steps may change of a result, as a share of it.
+    pub const fn step_error(self) -> f64 {
+        match self {
+            Self::Quick => 1e-2,
+            Self::Full => 1e-3,
+        }
+    }
 }
 
 /// A study that cannot be finished.
@@ -178,16 +188,15 @@ impl Findings {
         self.published.push(Published { label: label.into(), origin, x: Some(x), y: None, plus_minus: None });
     }
 
-    /// Says which engines did the runs.
-    fn done_on(&mut self, planar: &Experiment, bullet: Option<f64>) {
-        let step = |step: f64| {
-            let micros = 1e6 * step;
-            format!("time step {} µs", fixed(micros, if (micros - micros.round()).abs() < 1e-6 { 0 } else { 2 }))
-        };
-        self.engines = format!("Ours: planar engine, {}.", step(planar.time_step));
-        if let Some(bullet) = bullet {
-            self.engines += &format!(" Spot checks: Bullet, {}.", step(bullet));
-        }
+    /// Says which engines did the runs: ours with steps that adapt, and Bullet with a time step (s).
+    fn done_on(&mut self, effort: Effort, bullet: f64) {
+        let micros = 1e6 * bullet;
+        let digits = if (micros - micros.round()).abs() < 1e-6 { 0 } else { 2 };
+        self.engines = format!(
+            "Ours: planar engine, steps that adapt to {} % of the result. Spot checks: Bullet, time step {} µs.",
+            100.0 * effort.step_error(),
+            fixed(micros, digits)
+        );
     }
 }
 
@@ -228,7 +237,7 @@ pub const STUDIES: [Study; 10] = [
         id: "cantilever-response",
         title: "Frequency response of the cantilever",
         section: "III-A",
-        cost_s: [10.0, 22.0],
+        cost_s: [8.0, 11.0],
         run: cantilever::response,
     },
     Study {
@@ -242,39 +251,39 @@ pub const STUDIES: [Study; 10] = [
         id: "robot-shapes",
         title: "Static shapes of the five-actuator robot",
         section: "III-B",
-        cost_s: [5.0, 7.0],
+        cost_s: [4.0, 4.0],
         run: walking::shapes,
     },
     Study {
         id: "inchworm",
         title: "Inchworm motion over five cycles",
         section: "III-B",
-        cost_s: [27.0, 30.0],
+        cost_s: [27.0, 27.0],
         run: walking::inchworm,
     },
-    Study { id: "jump-14hz", title: "In-place jumping at 14 Hz", section: "III-C", cost_s: [4.0, 6.0], run: jumping::at_14_hz },
+    Study { id: "jump-14hz", title: "In-place jumping at 14 Hz", section: "III-C", cost_s: [3.0, 3.0], run: jumping::at_14_hz },
     Study {
         id: "key-shapes-14hz",
         title: "The three key shapes at 14 Hz",
         section: "III-C",
-        cost_s: [4.0, 6.0],
+        cost_s: [3.0, 3.0],
         run: jumping::key_shapes,
     },
     Study {
         id: "jump-frequency",
         title: "Jump height against frequency",
         section: "III-C",
-        cost_s: [10.0, 20.0],
+        cost_s: [9.0, 10.0],
         run: jumping::over_frequency,
     },
     Study {
         id: "jump-on-time",
         title: "Jump height against on-time",
         section: "authors' notebook",
-        cost_s: [15.0, 35.0],
+        cost_s: [15.0, 15.0],
         run: jumping::over_on_time,
     },
-    Study { id: "speed", title: "Speed against frequency", section: "IV", cost_s: [60.0, 120.0], run: walking::speed },
+    Study { id: "speed", title: "Speed against frequency", section: "IV", cost_s: [54.0, 58.0], run: walking::speed },
 ];
 
 /// Where studies are done: threads, folder, effort.
@@ -297,18 +306,12 @@ impl<'a> Bench<'a> {
         Self { effort, jobs, folder, stop, done: RefCell::default() }
     }
 
-    /// Time step of single runs on the planar engine (s).
-    fn time_step(&self) -> f64 {
-        match self.effort {
-            Effort::Quick => 2e-5,
-            Effort::Full => 4e-6,
-        }
-    }
-
-    /// Runs a preset with settings on the planar engine.
-    fn run(&self, preset: &str, settings: &[&str]) -> Result<(Experiment, Run), StudyError> {
-        let step = format!("simulation.time_step_s={:e}", self.time_step());
-        self.run_as(preset, &[settings, &["simulation.engine=planar", &step]].concat())
+    /// Runs a preset with settings on the planar engine: the measure, or the path of all nodes, to what the effort allows.
+    fn run(&self, preset: &str, measure: Option<&str>, settings: &[&str]) -> Result<(Experiment, Run), StudyError> {
+        let error = format!("simulation.step_error={:e}", self.effort.step_error());
+        let measure = measure.map(|name| format!("simulation.step_measure={name}"));
+        let adaptive = ["simulation.engine=planar", "simulation.time_step_s=auto", &error];
+        self.run_as(preset, &[settings, &adaptive, measure.as_deref().as_slice()].concat())
     }
 
     /// The same on Bullet at the preset's time step.
@@ -347,19 +350,9 @@ impl<'a> Bench<'a> {
         self.points(id, Sweep::open(Path::new(&format!("preset:{preset}")), &settings)?)
     }
 
-    /// A built-in sweep with the time step of single runs, so that its points are theirs.
-    fn sweep_of_runs(&self, id: &str, preset: &str, settings: &[&str]) -> Result<(Sweep, Vec<Point>), StudyError> {
-        let settings: Vec<String> = settings.iter().map(|setting| (*setting).to_owned()).collect();
-        let mut sweep = Sweep::open(Path::new(&format!("preset:{preset}")), &settings)?;
-        set_time_step(&mut sweep, self.time_step());
-        self.compute(id, sweep)
-    }
-
-    /// The same of any sweep.
+    /// The same of a sweep that was changed.
     fn points(&self, id: &str, mut sweep: Sweep) -> Result<(Sweep, Vec<Point>), StudyError> {
-        if self.effort == Effort::Full {
-            sweep.refine(5)?;
-        }
+        fix(&mut sweep, STEP_ERROR, self.effort.step_error());
         self.compute(id, sweep)
     }
 
@@ -367,7 +360,8 @@ impl<'a> Bench<'a> {
     fn spots(&self, id: &str, sweep: &Sweep, step: f64, values: &[f64]) -> Result<Vec<(f64, f64)>, StudyError> {
         let mut sweep = sweep.clone();
         sweep.source.set("simulation.engine=bullet")?;
-        set_time_step(&mut sweep, step);
+        sweep.axes.retain(|axis| ![STEP_ERROR, STEP_MEASURE].contains(&axis.key.as_str()));
+        fix(&mut sweep, TIME_STEP, step);
         if let Some(axis) = sweep.axes.last_mut() {
             axis.values = values.iter().map(|value| (*value).into()).collect();
         }
@@ -388,10 +382,14 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Sets the time step (s) of a sweep that has an axis for it.
-fn set_time_step(sweep: &mut Sweep, step: f64) {
-    for axis in sweep.axes.iter_mut().filter(|axis| axis.key == "simulation.time_step_s") {
-        axis.values = vec![step.into()];
+const TIME_STEP: &str = "simulation.time_step_s";
+const STEP_ERROR: &str = "simulation.step_error";
+const STEP_MEASURE: &str = "simulation.step_measure";
+
+/// Gives an axis of a sweep one value.
+fn fix(sweep: &mut Sweep, key: &str, value: f64) {
+    for axis in sweep.axes.iter_mut().filter(|axis| axis.key == key) {
+        axis.values = vec![value.into()];
     }
 }
 

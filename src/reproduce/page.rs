@@ -15,12 +15,9 @@ pub fn page(effort: Effort, made_by: &str, results: &[(Study, Result<Findings, S
     let title = "The paper's results, reproduced";
     let mut out = format!(
         "<h1>{title}</h1>\n<p>Zheng et al., “Scalable Simulation and Demonstration of Jumping Piezoelectric 2-D Soft Robots”, ICRA 2022, beside this \
-         program. The numbers under “ours” are the planar engine's, {}; some runs are repeated on Bullet, with its own column. No number was fitted \
+         program. The numbers under “ours” are the planar engine's, to {} %: steps adapt until a tighter tolerance changes no more; some runs are repeated on Bullet, with its own column. No number was fitted \
          to these results. Made by <code>{}</code>.</p>\n<nav>",
-        match effort {
-            Effort::Quick => "single runs by 20 µs, scans at their presets' time steps",
-            Effort::Full => "single runs by 4 µs, scans at a fifth of their presets' time steps",
-        },
+        100.0 * effort.step_error(),
         escape(made_by)
     );
     for (study, _) in results {

@@ -28,7 +28,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     figure.setting("constant voltages, on the floor, m = 3").filled_aspect().floor().size(WHOLE);
     for volts in ["0,300,-960,300,0", "300,300,-960,300,0"] {
         let settings = [&format!("drive.voltages_v=[{volts}]"), "robot.positive_gain=1.733"];
-        let (experiment, run) = bench.run("static-shape", &settings)?;
+        let (_, run) = bench.run("static-shape", None, &settings)?;
         let volts = minus(volts).replace(',', ", ");
         let r = &run.recording;
         let last = r.len() - 1;
@@ -48,7 +48,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
             "The figure's points are not published as numbers. Positive voltages count 1.733 times, as the authors' constants say of the real piezo.",
         );
         let (there, spot) = bench.run_on_bullet("static-shape", &settings)?;
-        findings.done_on(&experiment, Some(there.time_step));
+        findings.done_on(bench.effort, there.time_step);
         let (r, last) = (&spot.recording, spot.recording.len() - 1);
         let bullet = (0..r.nodes()).map(|node| 10.0 * r.node(last, node)[2]).fold(f64::NEG_INFINITY, f64::max);
         findings.check_on_bullet("mm", highest, bullet);
@@ -59,7 +59,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
 }
 
 pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
-    let (experiment, run) = bench.run("inchworm-1hz", &[])?;
+    let (_, run) = bench.run("inchworm-1hz", Some("stride_mm"), &[])?;
     let r = &run.recording;
     let stride = run.measures.stride_mm.unwrap_or(f64::NAN);
     let mut findings = Findings::default();
@@ -71,7 +71,7 @@ pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
         "The friction of film and robot is not given in the paper; ours is 4.0 and 0.2. With the reference's low friction of 2.5 the stride is 1.1 mm.",
     );
     let (there, spot) = bench.run_on_bullet("inchworm-1hz", &[])?;
-    findings.done_on(&experiment, Some(there.time_step));
+    findings.done_on(bench.effort, there.time_step);
     let bullet = spot.measures.stride_mm.unwrap_or(f64::NAN);
     findings.check_on_bullet("mm", stride, bullet);
     let mut figure = Figure::new("Inchworm motion", "time (s)", "travel along x (mm)");
@@ -112,7 +112,7 @@ pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
         "Forward motion lasts longer here; friction, which decides it, is not specified.",
     );
     let bullet = bench.spots("speed", &sweep, SPOTS_STEP, &SPOTS_HZ)?;
-    findings.done_on(&sweep.experiment(0)?, Some(SPOTS_STEP));
+    findings.done_on(bench.effort, SPOTS_STEP);
     for &(f, on_bullet) in &bullet {
         let ours = at(f);
         let published = SPEEDS.iter().find(|(at, _)| *at == f).map(|(_, speed)| *speed);

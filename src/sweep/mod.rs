@@ -208,25 +208,6 @@ impl Sweep {
         Self::with_settings(&name, &text, path.parent().unwrap_or(Path::new("")), settings)
     }
 
-    /// Divides every point's time step by `factor`.
-    ///
-    /// # Errors
-    /// As [`from_text`](Self::from_text).
-    pub fn refine(&mut self, factor: u32) -> Result<(), ConfigError> {
-        let finer = |step: f64| step / f64::from(factor);
-        if let Some(axis) = self.axes.iter_mut().find(|axis| axis.key == "simulation.time_step_s") {
-            axis.values.iter_mut().for_each(|value| {
-                if let Some(step) = value.as_float() {
-                    *value = Value::Float(finer(step));
-                }
-            });
-        } else {
-            let step = self.experiment(0)?.time_step;
-            self.source.set(&format!("simulation.time_step_s={}", finer(step)))?;
-        }
-        (0..self.len()).try_for_each(|index| self.experiment(index).map(|_| ()))
-    }
-
     /// Number of points.
     pub fn len(&self) -> usize {
         self.axes.iter().map(|axis| axis.values.len()).product()
