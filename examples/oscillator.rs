@@ -9,8 +9,8 @@
 use std::f64::consts::PI;
 
 use sfers::diagnose::diagnosis::Verdict;
+use sfers::diagnose::pipeline::diagnose;
 use sfers::diagnose::plant::{Candidate, Free, Model, Plant, Signal};
-use sfers::diagnose::verdict::diagnose;
 
 const OMEGA: f64 = 2.0 * PI * 1.5;
 const ZETA: f64 = 0.05;

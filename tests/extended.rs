@@ -36,9 +36,9 @@ fn write(folder: &Path, mount: &str, m: usize) {
 
 /// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.
 fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) -> Result<f64, String> {
-    let unknowns = vec![0.4; plant.unknowns(0)];
-    let predicted = plant.predict(model, 0, &unknowns)?;
-    let (toml, drive) = extended::experiment(dataset, plant, model, 0, &unknowns);
+    let nuisances = vec![0.4; plant.nuisances(0)];
+    let predicted = plant.predict(model, 0, &nuisances)?;
+    let (toml, drive) = extended::experiment(dataset, plant, model, 0, &nuisances);
     fs::write(folder.join("extended.toml"), &toml).unwrap();
     fs::write(folder.join("drive.csv"), drive).unwrap();
     let source = Source::from_file(&folder.join("extended.toml")).unwrap();
@@ -79,7 +79,7 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
         let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
         let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
         let nominal = Model { terms: Vec::new(), resolution: m as f64, fine: true };
-        let plain = plant.predict(&nominal, 0, &vec![0.4; plant.unknowns(0)]).unwrap();
+        let plain = plant.predict(&nominal, 0, &vec![0.4; plant.nuisances(0)]).unwrap();
         let resolutions = [m as f64, 5.0];
         for resolution in resolutions {
             let found = apart(folder.path(), &dataset, &plant, &Model { resolution, ..nominal.clone() }).unwrap();
@@ -92,7 +92,7 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
                     // On the way from where the cause does nothing.
                     let x = start.iter().zip(&c.parameters).map(|(x, p)| p.off.map_or(*x, |off| off + share * (x - off)));
                     let model = Model { terms: vec![Term { candidate, x: x.collect() }], resolution: 4.0, fine: true };
-                    let Ok(predicted) = plant.predict(&model, 0, &vec![0.4; plant.unknowns(0)]) else {
+                    let Ok(predicted) = plant.predict(&model, 0, &vec![0.4; plant.nuisances(0)]) else {
                         // What cannot be simulated is not adopted.
                         refused.push(c.id);
                         continue;

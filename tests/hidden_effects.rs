@@ -13,7 +13,7 @@ mod judge;
 use generator::{Case, INSIDE, OUTSIDE, Truth};
 use judge::{diagnosed, holds, is_right, long, names};
 use sfers::diagnose::diagnosis::Verdict;
-use sfers::diagnose::verdict::Outcome;
+use sfers::diagnose::pipeline::Outcome;
 
 /// Writes the case's data and diagnoses them.
 fn found(case: &Case) -> (Truth, Outcome) {

@@ -13,7 +13,7 @@ mod judge;
 use ground::{Film, Floor, INSIDE, film, hide, nominal, trace, write};
 use judge::{diagnosed, holds, is_right, long, names};
 use sfers::diagnose::diagnosis::Verdict;
-use sfers::diagnose::verdict::Outcome;
+use sfers::diagnose::pipeline::Outcome;
 
 const NOISE_MM: f64 = 0.1;
 

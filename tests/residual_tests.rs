@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use sfers::diagnose::plant::{Candidate, Model, Plant, Signal};
+use sfers::diagnose::residual_tests::residual_tests;
 use sfers::diagnose::search::Split;
-use sfers::diagnose::tests::residual_tests;
 
 /// Plants, runs of each, and alarms of a test on every run that a rate of 1/1000 gives in all: 20 ± 4.5, so that 4 to 40 lie within four and a half
 /// standard deviations (binomial).
@@ -34,7 +34,7 @@ impl Plant for Measured {
         &[]
     }
 
-    fn predict(&self, _model: &Model, _run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
+    fn predict(&self, _model: &Model, _run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, String> {
         Ok(Vec::new())
     }
 }

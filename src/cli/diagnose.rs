@@ -11,7 +11,7 @@ use super::output::{finish, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::diagnose::dataset::{DataError, Dataset};
 use crate::diagnose::diagnosis::Verdict;
-use crate::diagnose::{extended, observations, protocols, quality, report, robot::RobotPlant, verdict};
+use crate::diagnose::{extended, observations, pipeline, protocols, quality, report, robot::RobotPlant};
 use crate::files::{FolderLock, Locking};
 
 /// Say what the simulation gets wrong beside measured data, name the cause, and measure what it gains on runs that no fit saw.
@@ -122,7 +122,7 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
         let plant = RobotPlant::new(dataset, &checked);
         let roles: Vec<_> = dataset.runs.iter().map(|run| run.role).collect();
         let separate = |models: &[crate::diagnose::plant::Model]| protocols::separate(&plant, models);
-        let outcome = verdict::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), &progress, &separate)?;
+        let outcome = pipeline::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), &progress, &separate)?;
         let files = extended::Files::new(dataset, &plant, &outcome);
         let context = report::Context { plant: &plant, robot: &dataset.robot, command: &command, extended: &files.experiment };
         let page = report::page(&outcome, &context);

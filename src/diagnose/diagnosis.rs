@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::names;
-use super::tests::ResidualTest;
+use super::residual_tests::ResidualTest;
 
 /// What the data say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -64,7 +64,7 @@ pub struct RunError {
     /// Root of the mean squared residual.
     pub rmse_mm: f64,
     /// The same in multiples of the noise.
-    pub rmse_noises: f64,
+    pub rmse_sigma: f64,
 }
 
 /// A model beside the data.

@@ -4,9 +4,9 @@
 //! between recorded steps by the cubic through positions and velocities elsewhere.
 
 use super::dataset::Dataset;
+use super::pipeline::Outcome;
 use super::plant::{Model, Plant};
 use super::robot::{NUMERICAL_DAMPING, ON_STEP, RobotPlant};
-use super::verdict::Outcome;
 use crate::effects::View;
 use crate::experiment::{DriveConfig, EffectConfig, SimulationConfig, StepConfig};
 use crate::model::Mount;
@@ -30,14 +30,14 @@ impl Files {
         let square = |run: &usize| outcome.calibrated.residuals[*run].iter().map(|r| r * r).sum::<f64>();
         let all = outcome.split.all();
         let run = all.iter().copied().max_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or(0);
-        let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.unknowns[run]);
+        let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run]);
         Self { experiment, drive, residuals: residuals(plant, outcome) }
     }
 }
 
 /// A model as an experiment file under the drive of a run, with the file of that drive, `drive.csv`: its recording is what the model predicts.
-pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usize, unknowns: &[f64]) -> (String, String) {
-    let table = plant.command(run).table(unknowns);
+pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usize, nuisances: &[f64]) -> (String, String) {
+    let table = plant.command(run).table(nuisances);
     let n = plant.robot().actuators;
     let names = std::iter::once("t_s".to_owned()).chain((1..=n).map(|a| format!("v{a}_v"))).collect();
     let rows = table.times().iter().enumerate();

@@ -4,7 +4,7 @@
 //! χ² = Σ ((y − f(x))/σ)²        minimised over the coordinates x of all terms, within their bounds
 //! ```
 //!
-//! Moments of jumps between rows belong to a run, not to the model ([`Plant::unknowns`]); they are fitted run by run between rounds of the
+//! Moments of jumps between rows belong to a run, not to the model ([`Plant::nuisances`]); they are fitted run by run between rounds of the
 //! model's own parameters. Every sum runs in a fixed order, so results do not depend on the number of threads.
 
 use std::collections::HashMap;
@@ -39,8 +39,8 @@ pub enum Care {
     Full,
 }
 
-/// Unknowns of all runs.
-pub type Unknowns = Vec<Vec<f64>>;
+/// Nuisances of all runs.
+pub type Nuisances = Vec<Vec<f64>>;
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -55,12 +55,12 @@ pub struct Fit {
     pub information: DMatrix<f64>,
 }
 
-/// The loop's view of a plant: which values count, and what is taken for each run's unknowns.
+/// The loop's view of a plant: which values count, and what is taken for each run's nuisances.
 pub struct Bench<'a> {
     /// The plant.
     pub plant: &'a dyn Plant,
     /// Moments of jumps and the like, as they are taken at present.
-    pub unknowns: Unknowns,
+    pub nuisances: Nuisances,
     /// Which values of each run count.
     pub used: Vec<Vec<bool>>,
     kept: Mutex<Kept>,
@@ -90,46 +90,46 @@ impl Kept {
 }
 
 /// Everything that a prediction depends on.
-fn key(model: &Model, run: usize, unknowns: &[f64]) -> Vec<u64> {
+fn key(model: &Model, run: usize, nuisances: &[f64]) -> Vec<u64> {
     let terms = model.terms.iter().flat_map(|term| {
         let numbers = term.x.iter().map(|x| x.to_bits());
         [term.candidate as u64, term.x.len() as u64].into_iter().chain(numbers)
     });
     let whole = [run as u64, model.resolution.to_bits(), u64::from(model.fine)];
-    whole.into_iter().chain(terms).chain(unknowns.iter().map(|x| x.to_bits())).collect()
+    whole.into_iter().chain(terms).chain(nuisances.iter().map(|x| x.to_bits())).collect()
 }
 
 /// Residuals of one run in standard deviations.
 pub type Residuals = Vec<f64>;
 
 impl<'a> Bench<'a> {
-    /// A plant with its unknowns at the ends of their intervals: a command is held until the row that shows its change.
+    /// A plant with its nuisances at the ends of their intervals: a command is held until the row that shows its change.
     pub fn new(plant: &'a dyn Plant) -> Self {
-        let unknowns = (0..plant.signals().len()).map(|run| vec![1.0; plant.unknowns(run)]).collect();
+        let nuisances = (0..plant.signals().len()).map(|run| vec![1.0; plant.nuisances(run)]).collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
-        Self { plant, unknowns, used, kept: Mutex::default() }
+        Self { plant, nuisances, used, kept: Mutex::default() }
     }
 
-    fn predict(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Arc<Vec<f64>>, String> {
-        let key = key(model, run, unknowns);
+    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Arc<Vec<f64>>, String> {
+        let key = key(model, run, nuisances);
         let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = kept().get(&key);
         if let Some(known) = known {
             return Ok(known);
         }
-        let predicted = Arc::new(self.plant.predict(model, run, unknowns)?);
+        let predicted = Arc::new(self.plant.predict(model, run, nuisances)?);
         kept().put(key, &predicted);
         Ok(predicted)
     }
 
     /// Residuals of a run.
     pub fn residuals(&self, model: &Model, run: usize) -> Result<Residuals, String> {
-        self.residuals_with(model, run, &self.unknowns[run])
+        self.residuals_with(model, run, &self.nuisances[run])
     }
 
-    fn residuals_with(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Residuals, String> {
+    fn residuals_with(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Residuals, String> {
         let signal = &self.plant.signals()[run];
-        let predicted = self.predict(model, run, unknowns)?;
+        let predicted = self.predict(model, run, nuisances)?;
         let each = signal.values.iter().zip(&*predicted).zip(&signal.sigmas).zip(&self.used[run]);
         Ok(each.map(|(((y, f), sigma), used)| if *used { (y - f) / sigma } else { 0.0 }).collect())
     }
@@ -340,11 +340,11 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// If the model cannot be simulated.
-    pub fn fit_unknowns(&mut self, model: &Model, runs: &[usize]) -> Result<(), String> {
+    pub fn fit_nuisances(&mut self, model: &Model, runs: &[usize]) -> Result<(), String> {
         const STEP: f64 = 0.05;
         for &run in runs {
             for _ in 0..3 {
-                let shares = self.unknowns[run].clone();
+                let shares = self.nuisances[run].clone();
                 if shares.is_empty() {
                     break;
                 }
@@ -390,7 +390,7 @@ impl<'a> Bench<'a> {
                     }
                 }
                 let Some((trial, chi2)) = better else { break };
-                self.unknowns[run] = trial;
+                self.nuisances[run] = trial;
                 if before - chi2 < 1.0 {
                     break;
                 }

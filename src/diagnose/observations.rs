@@ -160,7 +160,7 @@ impl Plant for Numbers<'_> {
         &self.candidates
     }
 
-    fn predict(&self, model: &Model, run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
+    fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, String> {
         let observation = &self.dataset.observations[run];
         let mut config = config(&self.dataset.nominal, observation)?;
         for term in &model.terms {
@@ -325,7 +325,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
             id: signal.id.clone(),
             role: "fit",
             rmse_mm: r[0].abs() * signal.sigmas[0],
-            rmse_noises: r[0].abs(),
+            rmse_sigma: r[0].abs(),
         });
         Ok(Stage {
             runs: runs.collect(),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::tests::ResidualTest;
+use super::residual_tests::ResidualTest;
 use crate::view::{escape, significant};
 
 /// Side of a test's square and the room between two models (px).

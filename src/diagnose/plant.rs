@@ -106,8 +106,8 @@ pub trait Plant: Sync {
         vec![1.0]
     }
 
-    /// Number of unknowns that belong to a run and not to the model, such as moments of jumps between two samples. They lie between 0 and 1.
-    fn unknowns(&self, _run: usize) -> usize {
+    /// Number of nuisances that belong to a run and not to the model, such as moments of jumps between two samples. They lie between 0 and 1.
+    fn nuisances(&self, _run: usize) -> usize {
         0
     }
 
@@ -120,5 +120,5 @@ pub trait Plant: Sync {
     ///
     /// # Errors
     /// Why it cannot be predicted, in words.
-    fn predict(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Vec<f64>, String>;
+    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Vec<f64>, String>;
 }

@@ -6,8 +6,8 @@ use super::diagnosis::{Diagnosis, Stage, Verdict, failing};
 use super::fit::Residuals;
 use super::names;
 use super::picture;
+use super::pipeline::Outcome;
 use super::plant::{Plant, Signal};
-use super::verdict::Outcome;
 use crate::model::Robot;
 use crate::view::page::{Cell, HALF, Table, document, figure};
 use crate::view::{Figure, Mark, digits_for, escape, fixed, minus, signed, significant};
@@ -140,7 +140,7 @@ fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
             fixed(nominal.rmse_mm, digits).into(),
             fixed(tuned.rmse_mm, digits).into(),
             fixed(extended.rmse_mm, digits).into(),
-            Cell::from(fixed(extended.rmse_noises, 2)).bad_if(extended.rmse_noises > LARGE),
+            Cell::from(fixed(extended.rmse_sigma, 2)).bad_if(extended.rmse_sigma > LARGE),
         ]);
     }
     out.push_str(&table.html());
@@ -310,7 +310,7 @@ fn tests(out: &mut String, d: &Diagnosis) {
     let mut table =
         Table::new(&["run", "test", "#nominal", "#re-tuned", "#extended", "#limit", "what it means, before and after"]);
     for ((a, b), c) in d.baseline.residual_tests.iter().zip(&d.calibrated.residual_tests).zip(&d.extended.residual_tests) {
-        let cell = |test: &super::tests::ResidualTest| Cell::from(fixed(test.statistic, 3)).bad_if(!test.passed);
+        let cell = |test: &super::residual_tests::ResidualTest| Cell::from(fixed(test.statistic, 3)).bad_if(!test.passed);
         let meaning = if a.meaning == c.meaning { a.meaning.clone() } else { format!("{}; then {}", a.meaning, c.meaning) };
         table.row([
             a.run.as_str().into(),

@@ -8,7 +8,7 @@ use super::quality;
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Means, Table, Waveform};
-use crate::effects::{self, Applied, EFFECTS, Kind, Parameter, Path, View};
+use crate::effects::{self, Applied, EFFECTS, Kind, Parameter, SignalChain, View};
 use crate::engine::{Engine, EngineError, PlanarEngine};
 use crate::experiment::hermite;
 use crate::model::{Mount, PointMass, Robot};
@@ -116,7 +116,7 @@ impl RobotPlant {
     fn longest_step(&self, run: usize) -> f64 {
         let finest = self.steps[run];
         let limit = 0.09 / (analytic::cantilever_frequency(&self.robot) * (self.robot.actuators as f64).powi(2));
-        let ends = vec![1.0; self.unknowns(run)];
+        let ends = vec![1.0; self.nuisances(run)];
         let with = |step: f64| self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok();
         let (Some(fine), Mount::Clamped) = (with(finest), self.robot.mount) else { return finest };
         let sigmas = &self.signals[run].sigmas;
@@ -177,12 +177,12 @@ impl RobotPlant {
             let position = robot.material.actuator_length * robot.actuators as f64;
             robot.extensions.point_masses.push(PointMass { mass: scene.added, position });
         }
-        let Staged { robot, drive, path, view } =
+        let Staged { robot, drive, chain, view } =
             self.staged(robot, &model.terms, model.resolution, scene.drive.clone(), scene.duration)?;
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
         let step = self.steps.iter().copied().fold(1e-3, f64::min);
         let tracks =
-            track_from(&robot, scene.hung, &drive, path, step, &scene.markers, &times).map_err(|error| error.to_string())?;
+            track_from(&robot, scene.hung, &drive, chain, step, &scene.markers, &times).map_err(|error| error.to_string())?;
         Ok(tracks.into_iter().flat_map(|at| view.of(at).map(|x| 10.0 * x)).collect())
     }
 
@@ -360,7 +360,7 @@ impl Plant for RobotPlant {
         std::iter::once(nominal).chain(finer).map(|m| m as f64).collect()
     }
 
-    fn unknowns(&self, run: usize) -> usize {
+    fn nuisances(&self, run: usize) -> usize {
         self.commands[run].jumps().len()
     }
 
@@ -376,9 +376,9 @@ impl Plant for RobotPlant {
         !candidate.is_constant || term.x.iter().any(|x| (x - 1.0).abs() > open)
     }
 
-    fn predict(&self, model: &Model, run: usize, unknowns: &[f64]) -> Result<Vec<f64>, String> {
+    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Vec<f64>, String> {
         let step = self.step(run) * if model.fine { 0.5 } else { 1.0 };
-        self.predict_with(&model.terms, model.resolution, run, unknowns, step)
+        self.predict_with(&model.terms, model.resolution, run, nuisances, step)
     }
 }
 
@@ -386,7 +386,7 @@ impl Plant for RobotPlant {
 struct Staged {
     robot: Robot,
     drive: Drive,
-    path: Path,
+    chain: SignalChain,
     view: View,
 }
 
@@ -397,13 +397,20 @@ impl RobotPlant {
         robot.motors_per_actuator = resolution as usize;
         let mut drive = Drive { waveform: Waveform::Table(command), positive_gain: 1.0, delay: 0.0 };
         effects::apply(&effects, &mut robot, &mut drive).map_err(|error| error.to_string())?;
-        let path = Path::new(&effects, robot.actuators, duration);
-        Ok(Staged { robot, drive, path, view: View::new(&effects) })
+        let chain = SignalChain::new(&effects, robot.actuators, duration);
+        Ok(Staged { robot, drive, chain, view: View::new(&effects) })
     }
 
-    fn predict_with(&self, terms: &[Term], resolution: f64, run: usize, unknowns: &[f64], step: f64) -> Result<Vec<f64>, String> {
-        let table = self.commands[run].table(unknowns);
-        let Staged { robot, drive, path, view } =
+    fn predict_with(
+        &self,
+        terms: &[Term],
+        resolution: f64,
+        run: usize,
+        nuisances: &[f64],
+        step: f64,
+    ) -> Result<Vec<f64>, String> {
+        let table = self.commands[run].table(nuisances);
+        let Staged { robot, drive, chain, view } =
             self.staged(self.robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
         // Rows at the same time stand in several channels.
@@ -411,7 +418,7 @@ impl RobotPlant {
         times.sort_by(f64::total_cmp);
         times.dedup();
         let seen: Vec<f64> = times.iter().map(|t| (t - view.delay).max(0.0)).collect();
-        let tracks = track(&robot, &drive, path, step, &self.markers, &seen).map_err(|error| error.to_string())?;
+        let tracks = track(&robot, &drive, chain, step, &self.markers, &seen).map_err(|error| error.to_string())?;
         let n = self.markers.len();
         let at = |(t, channel): (&f64, &usize)| {
             let row = times.partition_point(|time| time < t);
@@ -430,12 +437,12 @@ impl RobotPlant {
 pub fn track(
     robot: &Robot,
     drive: &Drive,
-    path: Path,
+    chain: SignalChain,
     step: f64,
     markers: &[f64],
     times: &[f64],
 ) -> Result<Vec<[f64; 2]>, EngineError> {
-    track_from(robot, 0.0, drive, path, step, markers, times)
+    track_from(robot, 0.0, drive, chain, step, markers, times)
 }
 
 /// The same from rest with a mass `hung` (g) at the end that is gone at the beginning.
@@ -443,7 +450,7 @@ fn track_from(
     robot: &Robot,
     hung: f64,
     drive: &Drive,
-    mut path: Path,
+    mut chain: SignalChain,
     h: f64,
     markers: &[f64],
     times: &[f64],
@@ -457,7 +464,7 @@ fn track_from(
     let mut means = Means::new(drive, n, 0.0);
     let mut volts = vec![0.0; n];
     drive.voltages(0.0, &mut volts);
-    path.settle(&mut volts);
+    chain.settle(&mut volts);
     if hung > 0.0 {
         let mut loaded = robot.clone();
         let position = robot.material.actuator_length * robot.actuators as f64;
@@ -497,7 +504,7 @@ fn track_from(
     };
     let (mut before, mut after): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
     let mut tracks = Vec::with_capacity(times.len() * markers.len());
-    let (parts, mut piece) = (path.parts(), vec![0.0; n]);
+    let (parts, mut piece) = (chain.parts(), vec![0.0; n]);
     let (mut step, mut next) = (0_u64, 0);
     while next < times.len() {
         let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
@@ -516,13 +523,13 @@ fn track_from(
         }
         if parts == 1 {
             means.over(from, to, &mut volts);
-            path.pass(h, &mut volts);
+            chain.pass(h, &mut volts);
         } else {
             volts.fill(0.0);
             for part in 0..parts {
                 let [a, b] = [part, part + 1].map(|k| from + h * k as f64 / parts as f64);
                 means.over(a, b, &mut piece);
-                path.pass(h / parts as f64, &mut piece);
+                chain.pass(h / parts as f64, &mut piece);
                 volts.iter_mut().zip(&piece).for_each(|(sum, v)| *sum += v / parts as f64);
             }
         }

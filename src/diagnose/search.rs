@@ -28,7 +28,7 @@ const TIED_CHI2: f64 = 12.0;
 const FINALISTS: usize = 7;
 /// Two causes are no pair if the squared sine of the angle between what they do is below this.
 const LEAST_ANGLE: f64 = 1e-3;
-/// Most turns between the runs' unknowns and the model.
+/// Most turns between the runs' nuisances and the model.
 const MOST_TURNS: usize = 10;
 /// Most causes beside constants.
 const MOST_CAUSES: usize = 4;
@@ -93,7 +93,7 @@ impl Scored {
 
 /// The search's state.
 pub struct Search<'a> {
-    /// Plant and unknowns.
+    /// Plant and nuisances.
     pub bench: Bench<'a>,
     /// The runs.
     pub split: Split,
@@ -146,13 +146,13 @@ impl Search<'_> {
         self.score(self.bench.fit(model, &self.split.fit, Care::Rank)?)
     }
 
-    /// Fits the runs' unknowns to a model and the model to them, by turns until nothing changes.
+    /// Fits the runs' nuisances to a model and the model to them, by turns until nothing changes.
     pub fn settle(&mut self, scored: Scored) -> Result<Scored, String> {
         let mut scored = scored;
         let all = self.split.all();
         for _ in 0..MOST_TURNS {
             let before = scored.total();
-            self.bench.fit_unknowns(scored.model(), &all)?;
+            self.bench.fit_nuisances(scored.model(), &all)?;
             scored = self.fitted(scored.model())?;
             if before - scored.total() < 1e-3 * (before - self.bench.count(&all) as f64).max(self.bench.count(&all) as f64) {
                 break;
@@ -698,7 +698,7 @@ mod tests {
             &self.candidates
         }
 
-        fn predict(&self, model: &Model, run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
+        fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, String> {
             let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
             Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
         }

@@ -12,11 +12,11 @@ mod driver;
 mod ground;
 mod measurement;
 mod numerics;
-mod path;
+mod signal_chain;
 mod structure;
 mod view;
 
-pub use path::{Path, Voltages};
+pub use signal_chain::{SignalChain, SignalStage};
 pub use view::View;
 
 use serde::Serialize;
@@ -99,7 +99,7 @@ pub enum Action {
     /// Changes the drive.
     Drive(fn(&[f64], &mut Drive)),
     /// Passes on the voltages of so many actuators in a run of so many seconds.
-    Voltages(fn(&[f64], usize, f64) -> Box<dyn Voltages>),
+    Voltages(fn(&[f64], usize, f64) -> Box<dyn SignalStage>),
     /// Changes what is seen.
     View(fn(&[f64], &mut View)),
     /// Changes joints per actuator, and the time step by a factor.

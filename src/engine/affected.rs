@@ -1,12 +1,12 @@
 //! An engine whose voltages pass effects on their way to the actuators.
 
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
-use crate::effects::Path;
+use crate::effects::SignalChain;
 
-/// Any engine behind a [`Path`].
+/// Any engine behind a [`SignalChain`].
 pub struct AffectedEngine {
     engine: Box<dyn Engine>,
-    path: Path,
+    chain: SignalChain,
     time_step: f64,
     voltages: Vec<f64>,
     /// Of one part of a step.
@@ -14,9 +14,9 @@ pub struct AffectedEngine {
 }
 
 impl AffectedEngine {
-    /// `engine`, which steps by `time_step` (s), behind a `path` that has come to rest at the first voltages.
-    pub fn new(engine: Box<dyn Engine>, path: Path, time_step: f64) -> Self {
-        Self { engine, path, time_step, voltages: Vec::new(), piece: Vec::new() }
+    /// `engine`, which steps by `time_step` (s), behind a `chain` that has come to rest at the first voltages.
+    pub fn new(engine: Box<dyn Engine>, chain: SignalChain, time_step: f64) -> Self {
+        Self { engine, chain, time_step, voltages: Vec::new(), piece: Vec::new() }
     }
 }
 
@@ -26,24 +26,24 @@ impl Engine for AffectedEngine {
         EngineError::unless_voltages(voltages.len(), self.actuators())?;
         self.voltages.clear();
         self.voltages.extend_from_slice(voltages);
-        self.path.pass(self.time_step, &mut self.voltages);
+        self.chain.pass(self.time_step, &mut self.voltages);
         self.engine.prepare(&self.voltages)
     }
 
     fn parts(&self) -> usize {
-        self.path.parts()
+        self.chain.parts()
     }
 
     /// Each part passes on its own; the engine gets the mean of what comes out.
     fn prepare_parts(&mut self, means: &[f64]) -> Result<(), EngineError> {
-        let parts = self.path.parts();
+        let parts = self.chain.parts();
         let actuators = means.len() / parts;
         self.voltages.clear();
         self.voltages.resize(actuators, 0.0);
         for mean in means.chunks_exact(actuators) {
             self.piece.clear();
             self.piece.extend_from_slice(mean);
-            self.path.pass(self.time_step / parts as f64, &mut self.piece);
+            self.chain.pass(self.time_step / parts as f64, &mut self.piece);
             self.voltages.iter_mut().zip(&self.piece).for_each(|(sum, v)| *sum += v / parts as f64);
         }
         self.engine.prepare(&self.voltages)
@@ -89,18 +89,18 @@ impl Engine for AffectedEngine {
         self.engine.numerical_loss()
     }
 
-    /// The path's memory, then the engine's state.
+    /// The chain's memory, then the engine's state.
     fn save(&self) -> Result<Vec<f64>, EngineError> {
-        let mut state = self.path.save();
+        let mut state = self.chain.save();
         state.extend(self.engine.save()?);
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
-        let held = self.path.held(state).ok_or(EngineError::State)?;
+        let held = self.chain.held(state).ok_or(EngineError::State)?;
         let (memory, rest) = state.split_at(held);
         self.engine.load(step, rest)?;
-        self.path.load(memory);
+        self.chain.load(memory);
         Ok(())
     }
 
@@ -121,16 +121,16 @@ impl Engine for AffectedEngine {
         self.engine.set_step(step);
     }
 
-    /// The path's memory, then the engine's checkpoint.
+    /// The chain's memory, then the engine's checkpoint.
     fn checkpoint(&self, into: &mut Vec<f64>) -> Result<(), EngineError> {
-        into.extend(self.path.save());
+        into.extend(self.chain.save());
         self.engine.checkpoint(into)
     }
 
     fn rewind(&mut self, checkpoint: &[f64]) -> Result<(), EngineError> {
-        let held = self.path.held(checkpoint).ok_or(EngineError::State)?;
+        let held = self.chain.held(checkpoint).ok_or(EngineError::State)?;
         let (memory, rest) = checkpoint.split_at(held);
-        self.path.load(memory);
+        self.chain.load(memory);
         self.engine.rewind(rest)
     }
 

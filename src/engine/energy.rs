@@ -1,4 +1,4 @@
-//! The books of energy: where it came from and where it went.
+//! The audit of energy: where it came from and where it went.
 //!
 //! ```text
 //! E = Σ (m v²/2 + I ω²/2) + Σ m g z + Σ k θ²/2        kinetic, gravitational, elastic
@@ -10,7 +10,7 @@
 //! time step that is too long. Work over a step is torque times the mean of the rates before and after, which is exact for the change of
 //! kinetic energy at a fixed pose.
 //!
-//! The books are kept in the plane of motion: displacements along y and turns about x and z, which contact makes by rounding, are left out.
+//! The audit are kept in the plane of motion: displacements along y and turns about x and z, which contact makes by rounding, are left out.
 
 use serde::Serialize;
 
@@ -91,7 +91,7 @@ struct Rise {
     link: Option<usize>,
 }
 
-/// Bodies of the chain as the books need them.
+/// Bodies of the chain as the audit need them.
 #[derive(Debug, Clone, Copy)]
 struct Body {
     length: f64,
@@ -108,9 +108,9 @@ struct Motion {
     rate: f64,
 }
 
-/// Keeps the books of one run.
+/// Keeps the audit of one run.
 #[derive(Debug)]
-pub struct Books {
+pub struct EnergyAudit {
     bodies: Vec<Body>,
     joint: PiezoJoint,
     gravity: f64,
@@ -134,8 +134,8 @@ pub struct Books {
     balance: EnergyBalance,
 }
 
-impl Books {
-    /// Opens the books of a robot that is stepped by `time_step` (s).
+impl EnergyAudit {
+    /// Opens the audit of a robot that is stepped by `time_step` (s).
     pub fn new(robot: &Robot, time_step: f64) -> Self {
         let thickness = robot.collision_thickness;
         let bodies: Vec<Body> = robot

@@ -11,7 +11,7 @@ mod planar;
 
 pub use affected::AffectedEngine;
 pub use bullet::BulletEngine;
-pub use energy::{Books, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
+pub use energy::{EnergyAudit, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
 pub(crate) use planar::NUMERICAL_DAMPING;
 pub use planar::{FrictionModel, PlanarEngine};
 

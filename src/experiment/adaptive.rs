@@ -170,8 +170,8 @@ impl AdaptiveRun<'_> {
         self.prepare_at(engine, time)?;
         self.observation.accumulator.places().copy_from_slice(&self.nodes[START]);
         self.observation.take_sample(time, true, engine.motor_voltages());
-        if let Some(books) = &mut self.observation.books {
-            books.take(time, engine)?;
+        if let Some(audit) = &mut self.observation.audit {
+            audit.take(time, engine)?;
         }
         if self.experiment.records(step) {
             self.observation.recorder.record(time, engine)?;
@@ -341,8 +341,8 @@ impl AdaptiveRun<'_> {
         if regular {
             self.observation.bending.take(&engine.joints().angles, end);
         }
-        if let Some(books) = &mut self.observation.books {
-            books.take(end, engine)?;
+        if let Some(audit) = &mut self.observation.audit {
+            audit.take(end, engine)?;
         }
         self.nodes.swap(START, END);
         Ok(())

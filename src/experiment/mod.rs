@@ -27,7 +27,7 @@ pub use run::{Control, Run, run};
 pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};
-use crate::effects::{Applied, Path};
+use crate::effects::{Applied, SignalChain};
 use crate::engine::{AffectedEngine, BulletEngine, Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::model::{Mount, Robot};
 use crate::recording::{GroundMeta, Meta, definitions};
@@ -98,10 +98,10 @@ impl Experiment {
     /// # Errors
     /// [`EngineError`] if the robot cannot be built.
     pub fn engine(&self) -> Result<Box<dyn Engine>, EngineError> {
-        let mut path = Path::new(&self.effects, self.robot.actuators, self.steps as f64 * self.time_step);
+        let mut chain = SignalChain::new(&self.effects, self.robot.actuators, self.steps as f64 * self.time_step);
         let mut voltages = vec![0.0; self.robot.actuators];
         self.drive.voltages(0.0, &mut voltages);
-        path.settle(&mut voltages);
+        chain.settle(&mut voltages);
         let engine: Box<dyn Engine> = match self.engine {
             EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
             EngineKind::Planar => {
@@ -116,7 +116,7 @@ impl Experiment {
                 Box::new(engine)
             }
         };
-        Ok(if path.is_empty() { engine } else { Box::new(AffectedEngine::new(engine, path, self.time_step)) })
+        Ok(if chain.is_empty() { engine } else { Box::new(AffectedEngine::new(engine, chain, self.time_step)) })
     }
 
     /// Leaves out records that `measures` do not come from, where nothing else is wanted of a run.

@@ -5,7 +5,7 @@ use super::{Experiment, StepChoice, auto};
 use crate::analytic;
 use crate::drive::{Means, Waveform};
 use crate::effects::View;
-use crate::engine::{Books, ClampHits, EnergyBalance, Engine, EngineError};
+use crate::engine::{ClampHits, EnergyAudit, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
 use crate::recording::accumulator::{MeasureAccumulator, SamplingPlan};
 use crate::recording::measures::{Measures, recorded_jump_height};
@@ -48,7 +48,7 @@ pub struct Run {
     pub bending: Bending,
     /// Where energy came from and where it went.
     pub energy: EnergyBalance,
-    /// Whether the books of energy were kept: they know the plain model only.
+    /// Whether the audit of energy were kept: they know the plain model only.
     pub audited: bool,
     /// How the steps were chosen, if they adapted.
     pub step_choice: Option<StepChoice>,
@@ -131,8 +131,8 @@ pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut
         } else {
             supply.prepare_at(engine, before)?;
         }
-        if let Some(books) = &mut observation.books {
-            books.take(time, engine)?;
+        if let Some(audit) = &mut observation.audit {
+            audit.take(time, engine)?;
         }
         let last = done + 1 == experiment.steps;
         let regular = sampled.comes(done) || last;
@@ -209,7 +209,7 @@ impl<'a> Supply<'a> {
 pub(super) struct Observation<'a> {
     experiment: &'a Experiment,
     pub(super) recorder: Recorder,
-    pub(super) books: Option<Books>,
+    pub(super) audit: Option<EnergyAudit>,
     pub(super) accumulator: MeasureAccumulator,
     pub(super) bending: Bending,
     view: View,
@@ -222,7 +222,7 @@ impl<'a> Observation<'a> {
     pub(super) fn new(experiment: &'a Experiment, start: u64, every: u64, last: u64) -> Self {
         Self {
             recorder: Recorder::new(experiment),
-            books: experiment.effects.is_empty().then(|| Books::new(&experiment.robot, experiment.time_step)),
+            audit: experiment.effects.is_empty().then(|| EnergyAudit::new(&experiment.robot, experiment.time_step)),
             accumulator: accumulator(experiment, start, every, last),
             bending: Bending::default(),
             view: View::new(&experiment.effects),
@@ -259,11 +259,11 @@ impl<'a> Observation<'a> {
 
     /// The run, which ended after `done` steps.
     pub(super) fn finish(self, engine: &dyn Engine, done: u64, interrupted: bool) -> Run {
-        let Self { experiment, recorder, books, accumulator, bending, view, origin } = self;
+        let Self { experiment, recorder, audit, accumulator, bending, view, origin } = self;
         let mut recording = recorder.recording;
         recording.meta = experiment.meta(done, String::new());
         see(&mut recording, &view, origin);
-        let energy = books.as_ref().map(Books::balance);
+        let energy = audit.as_ref().map(EnergyAudit::balance);
         let mut measures = Measures { energy_error: energy.map(|energy| energy.error()), ..accumulator.measures() };
         if measures.jump_height_mm.is_some() {
             measures.recorded_jump_height_mm = Some(recorded_jump_height(&recording));

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use sfers::diagnose::dataset::Dataset;
 use sfers::diagnose::diagnosis::{Adopted, Diagnosis, Verdict};
+use sfers::diagnose::pipeline::{Outcome, diagnose};
 use sfers::diagnose::plant::Model;
 use sfers::diagnose::robot::RobotPlant;
-use sfers::diagnose::verdict::{Outcome, diagnose};
 use sfers::diagnose::{protocols, quality};
 
 /// Diagnoses a data set as `sfers diagnose` does.

@@ -10,7 +10,7 @@
 //! With p = 0 a step grows by c of itself in every decade of time, with another p by a power law of time. r is the number of elements in a decade; the
 //! usual chain has one, the first at 0.1 s. With r = 0 there is one element of the weight c.
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const CREEP: Effect = Effect {
@@ -103,7 +103,7 @@ struct Creep {
 /// Most elements that a memory may hold: four in each of 50 decades.
 const MOST_ELEMENTS: f64 = 200.0;
 
-impl Voltages for Creep {
+impl SignalStage for Creep {
     /// What has crept before is part of the settled shape: q_j = V.
     fn settle(&mut self, volts: &mut [f64]) {
         self.behind.iter_mut().for_each(|q| q.copy_from_slice(volts));

@@ -4,7 +4,7 @@
 //! θ_V = −γ·ℓ·V·(1 + b₁·|V| + b₂·V²)
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const FIELD_DEPENDENT_GAIN: Effect = Effect {
@@ -32,7 +32,7 @@ struct Gain {
     curvature: f64,
 }
 
-impl Voltages for Gain {
+impl SignalStage for Gain {
     fn settle(&mut self, volts: &mut [f64]) {
         volts.iter_mut().for_each(|v| *v *= 1.0 + self.slope * v.abs() + self.curvature * *v * *v);
     }

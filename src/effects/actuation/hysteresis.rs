@@ -10,7 +10,7 @@
 //! geometric series from 30 to 1400 V with weights r^shape·exp(−decay·r); their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its
 //! middle. The plays begin at the first voltage, or (`from_zero = 1`) have come from 0 V to it. g is 1 in the plain forms: which slope of a loop is called its gain is a convention.
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const HYSTERESIS: Effect = Effect {
@@ -123,7 +123,7 @@ impl BoucWen {
     }
 }
 
-impl Voltages for BoucWen {
+impl SignalStage for BoucWen {
     fn settle(&mut self, volts: &mut [f64]) {
         self.volts.copy_from_slice(volts);
         self.state.fill(0.0);
@@ -190,7 +190,7 @@ impl Plays {
     }
 }
 
-impl Voltages for Plays {
+impl SignalStage for Plays {
     fn settle(&mut self, volts: &mut [f64]) {
         for (plays, volts) in self.plays.chunks_exact_mut(RADII).zip(&*volts) {
             plays.fill(if self.from_zero { 0.0 } else { *volts });
@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     /// Opening of the loop between 0 and −1500 V at its middle (V), in steps of `step` volts.
-    fn opening(hysteresis: &mut dyn Voltages, step: f64) -> f64 {
+    fn opening(hysteresis: &mut dyn SignalStage, step: f64) -> f64 {
         let steps = (1500.0 / step) as usize;
         hysteresis.settle(&mut [0.0]);
         let mut middle = [0.0; 2];

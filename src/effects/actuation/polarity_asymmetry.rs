@@ -4,7 +4,7 @@
 //! θ_V = −γ·ℓ·r·V for V > 0, −γ·ℓ·V otherwise
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const POLARITY_ASYMMETRY: Effect = Effect {
@@ -26,7 +26,7 @@ pub const POLARITY_ASYMMETRY: Effect = Effect {
 
 struct Ratio(f64);
 
-impl Voltages for Ratio {
+impl SignalStage for Ratio {
     fn settle(&mut self, volts: &mut [f64]) {
         volts.iter_mut().filter(|v| **v > 0.0).for_each(|v| *v *= self.0);
     }

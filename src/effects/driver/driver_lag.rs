@@ -4,7 +4,7 @@
 //! T·dV_a/dt + V_a = V_c,  T = R·C
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const DRIVER_LAG: Effect = Effect {
@@ -30,7 +30,7 @@ struct Lag {
     volts: Vec<f64>,
 }
 
-impl Voltages for Lag {
+impl SignalStage for Lag {
     fn settle(&mut self, volts: &mut [f64]) {
         self.volts.copy_from_slice(volts);
     }

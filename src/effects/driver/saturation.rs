@@ -4,7 +4,7 @@
 //! V_a = min(V_hi, max(V_lo, V_c))
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const SATURATION: Effect = Effect {
@@ -39,7 +39,7 @@ struct Limits {
     min: f64,
 }
 
-impl Voltages for Limits {
+impl SignalStage for Limits {
     fn settle(&mut self, volts: &mut [f64]) {
         volts.iter_mut().for_each(|v| *v = v.max(self.min).min(self.max));
     }

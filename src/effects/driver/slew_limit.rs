@@ -4,7 +4,7 @@
 //! |dV_a/dt| ≤ S, otherwise V_a = V_c
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, Voltages};
+use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
 /// See the file's head.
 pub const SLEW_LIMIT: Effect = Effect {
@@ -30,7 +30,7 @@ struct Slew {
     volts: Vec<f64>,
 }
 
-impl Voltages for Slew {
+impl SignalStage for Slew {
     fn settle(&mut self, volts: &mut [f64]) {
         self.volts.copy_from_slice(volts);
     }

@@ -180,9 +180,9 @@ pub(super) const PUSHED_FORWARD: f64 = 2.0;
 
 /// The states of two corners.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Touch(f64x2);
+pub(super) struct ContactMode(f64x2);
 
-impl Touch {
+impl ContactMode {
     #[inline(always)]
     fn new(sticks: f64x2, slides: f64x2, direction: f64x2) -> Self {
         Self((sticks & f64x2::ONE) | (slides & f64x2::splat(2.0).copysign(direction)))
@@ -226,7 +226,7 @@ impl Touch {
 
 /// Coefficients of friction μ, and what the law needs of them.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Grip {
+pub(super) struct FrictionCone {
     friction: f64x2,
     /// 1/(1 + μ²).
     share: f64x2,
@@ -234,7 +234,7 @@ pub(super) struct Grip {
     slide: [f64x2; 2],
 }
 
-impl Grip {
+impl FrictionCone {
     pub(super) fn new(friction: f64x2) -> Self {
         let share = f64x2::ONE / (f64x2::ONE + friction * friction);
         Self { friction, share, slide: [friction * share.sqrt(), share.sqrt()] }
@@ -245,7 +245,7 @@ impl Grip {
     }
 }
 
-/// The bottom corners of a rung's bodies at their reference points or at their other ends.
+/// The bottom corners of a level's bodies at their reference points or at their other ends.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Corners {
     /// From the bodies' reference points (cm).
@@ -253,10 +253,10 @@ pub(super) struct Corners {
     /// The last look at the floor that found one of them near, and the mask of those.
     look: u64,
     near: f64x2,
-    touch: Touch,
+    touch: ContactMode,
     /// The states that the newest solution asks for.
-    asked: Touch,
-    grip: Grip,
+    asked: ContactMode,
+    grip: FrictionCone,
     /// Mean velocity w* that stops them on the floor at the end (cm/s).
     target: [f64x2; 2],
     /// Mean velocity of the iterate (cm/s).
@@ -285,12 +285,12 @@ fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
 }
 
 impl Corners {
-    pub(super) fn new(grip: Grip) -> Self {
+    pub(super) fn new(grip: FrictionCone) -> Self {
         Self { grip, ..Self::default() }
     }
 
     /// Changes the friction.
-    pub(super) fn set_grip(&mut self, grip: Grip) {
+    pub(super) fn set_grip(&mut self, grip: FrictionCone) {
         self.grip = grip;
     }
 
@@ -320,7 +320,7 @@ impl Corners {
     }
 
     /// Takes stored states up again.
-    pub(super) fn restore(&mut self, touch: Touch, look: u64) {
+    pub(super) fn restore(&mut self, touch: ContactMode, look: u64) {
         (self.touch, self.look) = (touch, look);
         self.impulse = [f64x2::ZERO; 2];
     }
@@ -350,8 +350,8 @@ impl Corners {
     }
 
     /// The states, in the time of a look.
-    pub(super) fn touch(&self, look: u64) -> Touch {
-        if self.look == look { self.touch } else { Touch::default() }
+    pub(super) fn touch(&self, look: u64) -> ContactMode {
+        if self.look == look { self.touch } else { ContactMode::default() }
     }
 
     /// Impulses of the floor on them over the step (dyn·s), in the time of a look.
@@ -361,7 +361,7 @@ impl Corners {
 
     /// The law: states and impulses at the mean velocities `v`.
     #[inline(always)]
-    fn law(&self, v: [f64x2; 2], law: &Law) -> (Touch, [f64x2; 2]) {
+    fn law(&self, v: [f64x2; 2], law: &Law) -> (ContactMode, [f64x2; 2]) {
         let stiffness = f64x2::splat(law.stiffness);
         let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
         let mu = self.grip.friction;
@@ -378,18 +378,18 @@ impl Corners {
         let normal = if coulomb { pressed } else { pressed * self.grip.share };
         let push = (mu * normal).copysign(pull[0]);
         let impulse = [(sticks & pull[0]) | (slides & push), (sticks & pull[1]) | (slides & normal)];
-        (Touch::new(sticks, slides, pull[0]), impulse)
+        (ContactMode::new(sticks, slides, pull[0]), impulse)
     }
 
     /// Direction of the impulses of sliding corners.
     #[inline(always)]
-    fn slide(&self, touch: Touch) -> [f64x2; 2] {
+    fn slide(&self, touch: ContactMode) -> [f64x2; 2] {
         [self.grip.slide[0].copysign(touch.0), self.grip.slide[1]]
     }
 
     /// a·b through the law's pieces: −dλ/dw = stiffness · (0, all, or the part along the slide).
     #[inline(always)]
-    fn product(&self, touch: Touch, a: [f64x2; 2], b: [f64x2; 2], law: &Law) -> f64x2 {
+    fn product(&self, touch: ContactMode, a: [f64x2; 2], b: [f64x2; 2], law: &Law) -> f64x2 {
         let d = self.slide(touch);
         let along = dot(a, d) * dot(b, d);
         f64x2::splat(law.stiffness) * ((touch.sticks() & dot(a, b)) | (touch.slides() & along))
@@ -507,7 +507,7 @@ impl Corners {
     /// Puts the corners in these states.
     #[inline(always)]
     pub(super) fn set_states(&mut self, states: [f64; 2]) {
-        self.touch = Touch(f64x2::new(states));
+        self.touch = ContactMode(f64x2::new(states));
     }
 
     /// Whether one of them slides.
@@ -528,7 +528,7 @@ impl Corners {
     #[inline(always)]
     pub(super) fn take_states(&mut self) {
         let turned = self.asked.slides() & self.asked.0.simd_eq(-self.touch.0);
-        self.touch = Touch(turned.select(f64x2::ONE, self.asked.0));
+        self.touch = ContactMode(turned.select(f64x2::ONE, self.asked.0));
     }
 
     /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).
@@ -578,7 +578,7 @@ mod tests {
     fn corners_that_stay_on_their_pieces_are_linear_on_the_way() {
         let law = Law::new(1e-4, 0.5, 1.0, FrictionModel::Convex);
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
-        let start = Corners { near, ..Corners::new(Grip::new(f64x2::splat(0.5))) };
+        let start = Corners { near, ..Corners::new(FrictionCone::new(f64x2::splat(0.5))) };
         let (mut stay, mut change) = (0, 0);
         // Velocities about the tip of the law's cones: sticking, sliding both ways, open.
         let around = |k: i32| [f64::from(k % 5) - 2.0, f64::from(k / 5) - 2.0].map(|part| f64x2::new([part, 0.4 * part - 0.1]));
@@ -610,7 +610,7 @@ mod tests {
     fn a_corner_that_leaves_the_floor_is_not_held() {
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
         for friction in [0.0, 0.5] {
-            let corners = Corners { near, ..Corners::new(Grip::new(f64x2::splat(friction))) };
+            let corners = Corners { near, ..Corners::new(FrictionCone::new(f64x2::splat(friction))) };
             let (touch, impulse) = corners.law([f64x2::ZERO, f64x2::ONE], &Law::new(1e-4, 0.5, 1.0, FrictionModel::Convex));
             assert_eq!((touch.0.to_array(), impulse.map(f64x2::to_array)), ([0.0; 2], [[0.0; 2]; 2]), "{friction}");
         }

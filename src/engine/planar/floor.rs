@@ -5,7 +5,7 @@ use std::ops::Range;
 use wide::f64x2;
 
 use super::LARGEST_FRICTION;
-use super::contact::{Candidates, Corners, Grip, Law, Touch};
+use super::contact::{Candidates, ContactMode, Corners, FrictionCone, Law};
 use super::lanes::{Lanes, fma, pair};
 use super::recursion::{Arms, Quad, Spatials};
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
@@ -13,10 +13,10 @@ use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 /// The corners of all bodies. Those that may touch in the step at hand are listed.
 #[derive(Debug, Default)]
 pub(super) struct Floor {
-    /// Two places per rung: at the reference points, then at the other ends.
+    /// Two places per level: at the reference points, then at the other ends.
     corners: Vec<Corners>,
-    /// Of each rung.
-    grips: Vec<Grip>,
+    /// Of each level.
+    grips: Vec<FrictionCone>,
     surface: Option<Surface>,
     half_thickness: f64,
     /// Places, in their order.
@@ -31,7 +31,7 @@ pub(super) struct Floor {
     of_parts: Vec<[f64x2; 2]>,
 }
 
-/// Height of both reference points of a rung above the floor, with half a thickness (cm), their velocity (cm/s), the bodies' rates (rad/s), and
+/// Height of both reference points of a level above the floor, with half a thickness (cm), their velocity (cm/s), the bodies' rates (rad/s), and
 /// the mask of the bodies that there are.
 struct Reference {
     gap: f64x2,
@@ -57,18 +57,18 @@ impl Surface {
     }
 
     /// Friction at the sliding speeds that the step begins with.
-    fn grip(&self, plain: Grip, speed: f64x2) -> Grip {
+    fn grip(&self, plain: FrictionCone, speed: f64x2) -> FrictionCone {
         let [a, b] = plain.friction();
         let [u, v] = speed.to_array();
         let friction = [self.stick_slip.friction(a, u), self.stick_slip.friction(b, v)];
-        Grip::new(f64x2::new(friction.map(|friction| friction.min(LARGEST_FRICTION))))
+        FrictionCone::new(f64x2::new(friction.map(|friction| friction.min(LARGEST_FRICTION))))
     }
 }
 
 impl Floor {
-    /// Corners with the coefficients of friction of both bodies of each rung, under boxes of twice `half_thickness` (cm).
+    /// Corners with the coefficients of friction of both bodies of each level, under boxes of twice `half_thickness` (cm).
     pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
-        let grips: Vec<Grip> = frictions.iter().map(|pair| Grip::new(f64x2::new(*pair))).collect();
+        let grips: Vec<FrictionCone> = frictions.iter().map(|pair| FrictionCone::new(f64x2::new(*pair))).collect();
         let corners: Vec<Corners> = grips.iter().flat_map(|grip| [Corners::new(*grip); 2]).collect();
         let places = || Vec::with_capacity(corners.len());
         Self {
@@ -101,7 +101,7 @@ impl Floor {
         for k in 0..levels {
             let quad = &quads[k / 2];
             let (along, across) = (pair(&quad.along, k % 2), pair(&quad.across, k % 2));
-            let rate = quad.motion[0].rung(k % 2);
+            let rate = quad.motion[0].level(k % 2);
             // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
             let down = half.copysign(along[0]);
             let (x, z) = (down * along[1], -down * along[0]);
@@ -111,7 +111,7 @@ impl Floor {
             if (inner | outer).any() {
                 // Most levels are not: what only these need is made here.
                 for level in carried..k {
-                    let (across, rate) = (pair(&quads[level / 2].across, level % 2), quads[level / 2].motion[0].rung(level % 2));
+                    let (across, rate) = (pair(&quads[level / 2].across, level % 2), quads[level / 2].motion[0].level(level % 2));
                     bending = [0, 1].map(|axis| next(bending[axis], -rate * (rate * across[axis]), level));
                 }
                 carried = k;
@@ -120,7 +120,7 @@ impl Floor {
                     velocity: moving,
                     acceleration: bending,
                     rate,
-                    there: quad.mass.rung(k % 2).simd_gt(f64x2::ZERO),
+                    there: quad.mass.level(k % 2).simd_gt(f64x2::ZERO),
                 };
                 self.place(2 * k, inner, [x, z], &from, law);
                 self.place(2 * k + 1, outer, [outer_x, outer_z], &from, law);
@@ -149,8 +149,8 @@ impl Floor {
         for k in 0..levels {
             let quad = &quads[k / 2];
             let [x, z] = pair(&along[k / 2], k % 2);
-            let (rate, reach) = (quad.motion[0].rung(k % 2), quad.reach.rung(k % 2));
-            let there = quad.mass.rung(k % 2).simd_gt(f64x2::ZERO);
+            let (rate, reach) = (quad.motion[0].level(k % 2), quad.reach.level(k % 2));
+            let there = quad.mass.level(k % 2).simd_gt(f64x2::ZERO);
             let corner = [half.copysign(x) * z, -half * x.abs()];
             for along in [f64x2::ZERO, reach] {
                 let (arm_x, arm_z) = (fma(along, x, corner[0]), fma(along, z, corner[1]));
@@ -243,16 +243,16 @@ impl Floor {
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
         for k in 0..2 * quads.len() {
-            let (quad, rung) = (&mut quads[k / 2], k % 2);
-            let across = quad.across[1].rung(rung);
+            let (quad, level) = (&mut quads[k / 2], k % 2);
+            let across = quad.across[1].level(level);
             // The lowest edge, from the reference point.
-            let edge = across.fast_min(f64x2::ZERO) - half * quad.along[0].rung(rung).abs();
-            let speed = quad.motion[1].rung(rung) - quad.motion[0].rung(rung) * (edge - quad.middle.rung(rung) * across);
-            let near = (at + edge).simd_lt(f64x2::splat(VISCOUS_REACH)) & quad.mass.rung(rung).simd_gt(f64x2::ZERO);
+            let edge = across.fast_min(f64x2::ZERO) - half * quad.along[0].level(level).abs();
+            let speed = quad.motion[1].level(level) - quad.motion[0].level(level) * (edge - quad.middle.level(level) * across);
+            let near = (at + edge).simd_lt(f64x2::splat(VISCOUS_REACH)) & quad.mass.level(level).simd_gt(f64x2::ZERO);
             let impulse = near.select(push * speed, f64x2::ZERO);
-            let [turn, x] = [0, 1].map(|part| quad.momentum[part].rung(rung));
-            quad.momentum[0].set_rung(rung, turn - edge * impulse);
-            quad.momentum[1].set_rung(rung, x + impulse);
+            let [turn, x] = [0, 1].map(|part| quad.momentum[part].level(level));
+            quad.momentum[0].set_level(level, turn - edge * impulse);
+            quad.momentum[1].set_level(level, x + impulse);
             at = next(at, across, k);
         }
     }
@@ -262,9 +262,9 @@ impl Floor {
         0..self.near.len()
     }
 
-    /// Where those of `rungs` are.
-    pub(super) fn among(&self, rungs: &Range<usize>) -> Range<usize> {
-        let [start, end] = [rungs.start, rungs.end].map(|rung| self.near.partition_point(|place| *place < 2 * rung));
+    /// Where those of `levels` are.
+    pub(super) fn among(&self, levels: &Range<usize>) -> Range<usize> {
+        let [start, end] = [levels.start, levels.end].map(|level| self.near.partition_point(|place| *place < 2 * level));
         start..end
     }
 
@@ -297,7 +297,7 @@ impl Floor {
         Inwards { corners: &self.corners, near: &self.near[among.clone()] }
     }
 
-    /// Calls `each` with the rungs of listed corners, with these and the mean motions of their bodies.
+    /// Calls `each` with the levels of listed corners, with these and the mean motions of their bodies.
     #[inline(always)]
     pub(super) fn near(&mut self, among: &Range<usize>, quads: &[Quad], mut each: impl FnMut(usize, &mut Corners, &Spatials)) {
         for &place in &self.near[among.clone()] {
@@ -342,7 +342,7 @@ impl Floor {
     }
 
     /// Sets friction to zero, or back to what it is.
-    pub(super) fn swap_grips(&mut self, other: &mut Vec<Grip>) {
+    pub(super) fn swap_grips(&mut self, other: &mut Vec<FrictionCone>) {
         std::mem::swap(&mut self.grips, other);
         for (place, corners) in self.corners.iter_mut().enumerate() {
             corners.set_grip(self.grips[place / 2]);
@@ -355,7 +355,7 @@ impl Floor {
         self.looks += 1;
     }
 
-    /// The states of all corners as numbers for storing: four per rung, at the reference points and at the other ends.
+    /// The states of all corners as numbers for storing: four per level, at the reference points and at the other ends.
     pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
         self.corners.iter().flat_map(|corners| corners.touch(self.looks).saved())
     }
@@ -363,7 +363,7 @@ impl Floor {
     /// Takes the states up again.
     pub(super) fn restore(&mut self, saved: &[f64]) {
         for (corners, saved) in self.corners.iter_mut().zip(saved.as_chunks().0) {
-            corners.restore(Touch::restored(*saved), self.looks);
+            corners.restore(ContactMode::restored(*saved), self.looks);
         }
     }
 }
@@ -376,15 +376,15 @@ pub(super) struct Inwards<'a> {
 }
 
 impl Inwards<'_> {
-    /// Takes those of `rung` off the end and returns what they add to the inertia and force of its bodies; none if all are open.
+    /// Takes those of `level` off the end and returns what they add to the inertia and force of its bodies; none if all are open.
     #[inline(always)]
-    pub(super) fn take(&mut self, rung: usize, law: &Law) -> Option<Arms> {
-        if self.near.last().is_none_or(|place| place / 2 != rung) {
+    pub(super) fn take(&mut self, level: usize, law: &Law) -> Option<Arms> {
+        if self.near.last().is_none_or(|place| place / 2 != level) {
             return None;
         }
         let (mut bodies, mut touch) = (Arms::default(), false);
         while let [rest @ .., place] = self.near
-            && place / 2 == rung
+            && place / 2 == level
         {
             self.near = rest;
             let corners = &self.corners[*place];
@@ -403,10 +403,10 @@ fn mean_at(place: usize, quads: &[Quad]) -> Spatials {
     pair(&quads[place / 4].mean, place / 2 % 2)
 }
 
-/// From a rung's reference points to the next one's: along each arm; from the root, lane 0 stays and lane 1 goes to the root's other end.
+/// From a level's reference points to the next one's: along each arm; from the root, lane 0 stays and lane 1 goes to the root's other end.
 #[inline(always)]
-pub(super) fn next(at: f64x2, across: f64x2, rung: usize) -> f64x2 {
-    if rung > 0 {
+pub(super) fn next(at: f64x2, across: f64x2, level: usize) -> f64x2 {
+    if level > 0 {
         return at + across;
     }
     let [at, across] = [at.to_array()[0], across.to_array()[0]];

@@ -123,6 +123,6 @@ impl PlanarEngine {
             *along = [x.into(), z.into()];
         }
         let height = self.centre[1] - Lanes::from(moment).sum();
-        self.floor.landing(&self.quads, &self.kept, self.rungs, [height, self.velocity[1] - Lanes::from(speed).sum()], least)
+        self.floor.landing(&self.quads, &self.kept, self.levels, [height, self.velocity[1] - Lanes::from(speed).sum()], least)
     }
 }

@@ -10,14 +10,14 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 use fearless_simd::{Simd, prelude::*};
 use wide::f64x2;
 
-/// One number of four bodies: left and right arm's on a rung, then the same on the next rung outwards.
+/// One number of four bodies: left and right arm's on a level, then the same on the next level outwards.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[repr(align(32))]
 pub(super) struct Lanes([f64; 4]);
 
 /// The same in a register.
 pub(super) type Four<S> = fearless_simd::f64x4<S>;
-/// Half of one: a rung.
+/// Half of one: a level.
 pub(super) type Two<S> = fearless_simd::f64x2<S>;
 
 impl Lanes {
@@ -68,28 +68,28 @@ impl Lanes {
         self.0[lane] = to;
     }
 
-    /// The two bodies of the first (0) or the second (1) of the rungs.
+    /// The two bodies of the first (0) or the second (1) of the levels.
     #[inline(always)]
-    pub(super) fn rung(&self, which: usize) -> f64x2 {
+    pub(super) fn level(&self, which: usize) -> f64x2 {
         f64x2::new(self.0.as_chunks().0[which])
     }
 
     #[inline(always)]
-    pub(super) fn set_rung(&mut self, which: usize, to: f64x2) {
+    pub(super) fn set_level(&mut self, which: usize, to: f64x2) {
         self.0.as_chunks_mut().0[which] = to.to_array();
     }
 
-    /// What it is for the rungs one further inwards, with the one `before` all these.
+    /// What it is for the levels one further inwards, with the one `before` all these.
     pub(super) fn inner(self, before: f64x2) -> Self {
         let ([a, b], [c, d, ..]) = (before.to_array(), self.0);
         Self([a, b, c, d])
     }
 }
 
-/// The two bodies of one rung, of some numbers.
+/// The two bodies of one level, of some numbers.
 #[inline(always)]
-pub(super) fn pair<const N: usize>(of: &[Lanes; N], rung: usize) -> [f64x2; N] {
-    from_fn(|k| of[k].rung(rung))
+pub(super) fn pair<const N: usize>(of: &[Lanes; N], level: usize) -> [f64x2; N] {
+    from_fn(|k| of[k].level(level))
 }
 
 /// The same in registers, of all four bodies.
@@ -98,7 +98,7 @@ pub(super) fn on<const N: usize, S: Simd>(simd: S, of: &[Lanes; N]) -> [Four<S>;
     from_fn(|k| of[k].on(simd))
 }
 
-/// [`Lanes::inner`], and the last rung's, which is before those that follow.
+/// [`Lanes::inner`], and the last level's, which is before those that follow.
 #[inline(always)]
 pub(super) fn inner<S: Simd>(values: Four<S>, before: Two<S>) -> (Four<S>, Two<S>) {
     let (first, second) = values.split();

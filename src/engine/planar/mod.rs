@@ -45,9 +45,9 @@
 //! Eng. 39 (1996) (time stepping with complementarity). M. Anitescu, Math. Program. 105 (2006) (the convex model). A. Castro et al., arXiv
 //! 2110.10107 (regularised cones and Newton's method).
 
-mod beyond;
 mod contact;
 mod floor;
+mod joint_extensions;
 mod landing;
 mod lanes;
 mod newton;
@@ -59,13 +59,13 @@ mod statics;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use wide::f64x2;
 
-pub(super) use self::beyond::GAUSS;
-use self::beyond::{Beyond, LARGEST_REPETITIONS};
 use self::contact::{Ahead, Law};
 use self::floor::{Floor, Surface};
+pub(super) use self::joint_extensions::GAUSS;
+use self::joint_extensions::{JointExtensions, LARGEST_REPETITIONS};
 use self::lanes::{Four, Lanes, Two, fma, inner, on};
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
-use self::recursion::{BLOCK, Hold, Motions, Outside, Quad, direction};
+use self::recursion::{BLOCK, BaseJoint, Motions, Outside, Quad, direction};
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
@@ -99,11 +99,11 @@ pub struct PlanarEngine {
     joint: PiezoJoint,
     motors_per_actuator: usize,
     mount: Mount,
-    hold: Hold,
+    hold: BaseJoint,
     /// Rest angle of each joint at 0 V (rad) and factor on its voltage, where there are such.
     rest_angles: Vec<f64>,
     gains: Vec<f64>,
-    beyond: Option<Beyond>,
+    beyond: Option<JointExtensions>,
     time_step: f64,
     gravity: f64,
     /// Along x and z (cm/s²).
@@ -114,8 +114,8 @@ pub struct PlanarEngine {
     root: usize,
     lengths: Vec<f64>,
     quads: Vec<Quad>,
-    /// Rungs with a body; if odd, the last quad has one without.
-    rungs: usize,
+    /// Levels with a body; if odd, the last quad has one without.
+    levels: usize,
     /// Directions put aside while others are looked at, or the links' vectors for the nodes' places.
     kept: Vec<[Lanes; 2]>,
     /// Centre of mass (cm) and its velocity (cm/s). A clamped chain has its left end here.
@@ -127,7 +127,7 @@ pub struct PlanarEngine {
     iterate: Vec<[Lanes; 3]>,
     /// Newton steps after which a contact problem is given up.
     largest_steps: u32,
-    /// Of each block of rungs, in chains on the ground that are long enough for solving in parts; empty otherwise.
+    /// Of each block of levels, in chains on the ground that are long enough for solving in parts; empty otherwise.
     outside: Vec<Outside>,
     /// Blocks with corners of which a solution asks other states.
     asking: Vec<bool>,
@@ -185,10 +185,10 @@ impl PlanarEngine {
         let weight = weight_of(damping, time_step);
         let clamped = robot.mount == Mount::Clamped;
         let root = if clamped { 0 } else { count / 2 };
-        let rungs = root.max(count - 1 - root) + 1;
-        let blocks = if robot.mount == Mount::Ground && rungs > LONGEST_WHOLE { rungs.div_ceil(BLOCK) } else { 0 };
-        let mut quads = vec![Quad::empty(); rungs.div_ceil(2)];
-        let mut frictions = vec![[0.0; 2]; rungs];
+        let levels = root.max(count - 1 - root) + 1;
+        let blocks = if robot.mount == Mount::Ground && levels > LONGEST_WHOLE { levels.div_ceil(BLOCK) } else { 0 };
+        let mut quads = vec![Quad::empty(); levels.div_ceil(2)];
+        let mut frictions = vec![[0.0; 2]; levels];
         for (i, segment) in segments.iter().enumerate() {
             let (quad, lane) = place(i, root);
             let at = &mut quads[quad];
@@ -213,11 +213,11 @@ impl PlanarEngine {
             at += segment.length;
         }
         let hold = match robot.mount {
-            Mount::Clamped if extensions.clamp_compliance > 0.0 => Hold::Hinged,
-            Mount::Clamped => Hold::Clamped,
-            _ => Hold::Free,
+            Mount::Clamped if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged,
+            Mount::Clamped => BaseJoint::Clamped,
+            _ => BaseJoint::Free,
         };
-        if hold == Hold::Hinged {
+        if hold == BaseJoint::Hinged {
             quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
         set_implicit(&mut quads, &joint, hold, weight, time_step);
@@ -232,7 +232,7 @@ impl PlanarEngine {
             hold,
             rest_angles,
             gains: extensions.joint_gains.clone(),
-            beyond: Beyond::new(extensions, robot.material.width, robot.link_length(), time_step, &quads),
+            beyond: JointExtensions::new(extensions, robot.material.width, robot.link_length(), time_step, &quads),
             time_step,
             gravity: robot.material.gravity,
             pull: pull(robot.material.gravity, extensions.slope),
@@ -253,7 +253,7 @@ impl PlanarEngine {
             outside: vec![Outside::default(); blocks],
             asking: vec![false; blocks],
             quads,
-            rungs,
+            levels,
             law: Law::new(time_step, weight, mass / count as f64, FrictionModel::default()),
             weight,
             numerical_damping: damping,
@@ -435,8 +435,8 @@ impl PlanarEngine {
         for (volts, gain) in state.motor_voltages.iter_mut().zip(&self.gains) {
             *volts *= gain;
         }
-        for k in 1..self.rungs {
-            let (quad, rung) = (&mut self.quads[k / 2], k % 2);
+        for k in 1..self.levels {
+            let (quad, level) = (&mut self.quads[k / 2], k % 2);
             let (left, right) = joints_of(k, self.root);
             let volts = |joint: Option<usize>| joint.and_then(|i| state.motor_voltages.get(i)).copied().unwrap_or(0.0);
             // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
@@ -446,8 +446,8 @@ impl PlanarEngine {
                 let rest = |joint: Option<usize>| joint.and_then(|i| self.rest_angles.get(i)).copied().unwrap_or(0.0);
                 rest_angle += f64x2::new([rest(left), -rest(Some(right))]);
             }
-            quad.volts.set_rung(rung, volts);
-            quad.rest_angle.set_rung(rung, rest_angle);
+            quad.volts.set_level(level, volts);
+            quad.rest_angle.set_level(level, rest_angle);
         }
     }
 
@@ -459,7 +459,7 @@ impl PlanarEngine {
         for (k, quad) in self.quads.iter().enumerate() {
             let angle = quad.angle - quad.angle.inner(before[0]);
             let rate = quad.motion[0] - quad.motion[0].inner(before[1]);
-            before = [quad.angle.rung(1), quad.motion[0].rung(1)];
+            before = [quad.angle.level(1), quad.motion[0].level(1)];
             let mut torque = quad.stiffness * (angle - quad.rest_angle + lag * rate);
             if let Some(beyond) = &self.beyond {
                 torque += -beyond.now(k, quad, angle - quad.rest_angle, rate);
@@ -580,12 +580,12 @@ fn weight_of(damping: f64, time_step: f64) -> f64 {
 }
 
 /// Sets what springs and dampers add to the joints' inertia in a step of `time_step` (s).
-fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, hold: Hold, weight: f64, time_step: f64) {
+fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, hold: BaseJoint, weight: f64, time_step: f64) {
     let implicit = Lanes::splat(weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step));
     for quad in quads.iter_mut() {
         quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
     }
-    if hold == Hold::Hinged {
+    if hold == BaseJoint::Hinged {
         let stiffness = quads[0].stiffness.lane(0);
         quads[0].implicit.set_lane(0, weight * time_step * stiffness * 0.5 * time_step);
     }
@@ -595,13 +595,13 @@ fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, hold: Hold, weight: f64,
 fn hang_levers(quads: &mut [Quad]) {
     let mut outside = f64x2::ZERO;
     for k in (0..2 * quads.len()).rev() {
-        let (quad, rung) = (&mut quads[k / 2], k % 2);
+        let (quad, level) = (&mut quads[k / 2], k % 2);
         if k == 0 {
             // On the root's other end hangs the right arm.
             outside = f64x2::splat(outside.to_array()[1]);
         }
-        let share = quad.share.rung(rung);
-        quad.lever.set_rung(rung, quad.reach.rung(rung) * (share * quad.middle.rung(rung) + outside));
+        let share = quad.share.level(level);
+        quad.lever.set_level(level, quad.reach.level(level) * (share * quad.middle.level(level) + outside));
         outside += share;
     }
 }
@@ -613,11 +613,11 @@ fn pull(gravity: f64, slope: f64) -> [f64; 2] {
 
 /// Quad and lane of body `i` of a chain with this root.
 fn place(i: usize, root: usize) -> (usize, usize) {
-    let (rung, arm) = if i <= root { (root - i, 0) } else { (i - root, 1) };
-    (rung / 2, 2 * (rung % 2) + arm)
+    let (level, arm) = if i <= root { (root - i, 0) } else { (i - root, 1) };
+    (level / 2, 2 * (level % 2) + arm)
 }
 
-/// The joints at the reference points of rung `k` of a chain with this root. That of the left arm's body is on its right, that of the right
+/// The joints at the reference points of level `k` of a chain with this root. That of the left arm's body is on its right, that of the right
 /// arm's, which may have ended, on its left.
 fn joints_of(k: usize, root: usize) -> (Option<usize>, usize) {
     (root.checked_sub(k), root + k - 1)
@@ -761,7 +761,7 @@ impl Engine for PlanarEngine {
         into.extend(self.centre.iter().chain(&self.velocity).chain(&self.work_sums));
         into.extend([self.numerical_loss, self.step as f64]);
         into.extend(self.floor.saved());
-        into.extend(self.beyond.iter().flat_map(Beyond::saved));
+        into.extend(self.beyond.iter().flat_map(JointExtensions::saved));
         Ok(())
     }
 
@@ -796,14 +796,14 @@ impl Engine for PlanarEngine {
         state.extend(bodies().flat_map(|i| [0, 1].map(|k| self.of_body(i, |quad| quad.along[k]))));
         state.extend(bodies().map(|i| self.of_body(i, |quad| quad.posed)));
         state.extend(self.floor.saved());
-        state.extend(self.beyond.iter().flat_map(Beyond::saved));
+        state.extend(self.beyond.iter().flat_map(JointExtensions::saved));
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
         let count = self.count;
         let corners = self.floor.saved().count();
-        let memory = self.beyond.iter().flat_map(Beyond::saved).count();
+        let memory = self.beyond.iter().flat_map(JointExtensions::saved).count();
         if state.len() != 7 * count + 4 + corners + memory || state.iter().any(|value| !value.is_finite()) {
             return Err(EngineError::State);
         }

@@ -21,8 +21,8 @@ const WHOLE: u32 = 3;
 const SEARCH_ENOUGH: f64 = 0.1;
 /// Steps of the search along one Newton step; it ends much earlier.
 const LARGEST_SEARCH: u32 = 60;
-/// In chains of more rungs than this, Newton's method first goes through the parts where corners change: so many times, and so many steps in
-/// each. Measured on robots that jump: with parts 31 rungs take 5 % longer, 46 as long, 61 an eighth less, 481 half; twice the steps or one
+/// In chains of more levels than this, Newton's method first goes through the parts where corners change: so many times, and so many steps in
+/// each. Measured on robots that jump: with parts 31 levels take 5 % longer, 46 as long, 61 an eighth less, 481 half; twice the steps or one
 /// time more, and parts with another block on either side, take as long or longer.
 pub(super) const LONGEST_WHOLE: usize = 40;
 const ROUNDS: u32 = 3;
@@ -61,7 +61,7 @@ impl PlanarEngine {
     pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &Law) {
         if self.mount == Mount::Ground {
             let (height, motion) = self.root_over_floor(simd);
-            self.floor.find(&self.quads, self.rungs, height, motion, law);
+            self.floor.find(&self.quads, self.levels, height, motion, law);
         }
     }
 
@@ -88,7 +88,7 @@ impl PlanarEngine {
         }
         let (largest, mut law) = (self.largest_steps, *law);
         for _ in 0..=SOFTENINGS {
-            let (whole, done) = self.newton_steps(simd, 0..self.rungs, self.floor.all(), largest, &law);
+            let (whole, done) = self.newton_steps(simd, 0..self.levels, self.floor.all(), largest, &law);
             steps += whole;
             if done {
                 return Ok(steps);
@@ -118,10 +118,10 @@ impl PlanarEngine {
     fn newton_rounds<S: Simd>(&mut self, simd: S, law: &Law) -> (u64, bool) {
         let mut steps = 0;
         for _ in 0..ROUNDS {
-            let (whole, among) = (0..self.rungs, self.floor.all());
+            let (whole, among) = (0..self.levels, self.floor.all());
             let mut asking = std::mem::take(&mut self.asking);
             asking.fill(false);
-            self.solve_and_ask(&whole, &among, law, |rung, agrees| asking[rung / BLOCK] |= !agrees);
+            self.solve_and_ask(&whole, &among, law, |level, agrees| asking[level / BLOCK] |= !agrees);
             self.asking = asking;
             steps += 1;
             if !self.asking.contains(&true) {
@@ -132,7 +132,7 @@ impl PlanarEngine {
             while let Some(last) = self.asking[..end].iter().rposition(|asks| *asks) {
                 // With the next block further in, if there is one.
                 end = self.asking[..last].iter().rposition(|asks| !*asks).unwrap_or(0);
-                let part = BLOCK * end..self.rungs.min(BLOCK * (last + 1));
+                let part = BLOCK * end..self.levels.min(BLOCK * (last + 1));
                 let among = self.floor.among(&part);
                 steps += self.newton_steps(simd, part, among, STEPS_IN_PART, law).0;
             }
@@ -140,34 +140,34 @@ impl PlanarEngine {
         (steps, false)
     }
 
-    /// Solves for the states of the corners as they are, and calls `each` with their rungs and whether the solution agrees with them.
+    /// Solves for the states of the corners as they are, and calls `each` with their levels and whether the solution agrees with them.
     #[inline(always)]
     pub(super) fn solve_and_ask(
         &mut self,
-        rungs: &Range<usize>,
+        levels: &Range<usize>,
         among: &Range<usize>,
         law: &Law,
         mut each: impl FnMut(usize, bool),
     ) -> Articulated {
-        let felt = self.solve_with_modes(rungs, among, law);
-        self.floor.near(among, &self.quads, |rung, corners, mean| each(rung, corners.agrees(mean, law)));
+        let felt = self.solve_with_modes(levels, among, law);
+        self.floor.near(among, &self.quads, |level, corners, mean| each(level, corners.agrees(mean, law)));
         felt
     }
 
     /// Solves for the contact modes as they are.
     #[inline(always)]
-    pub(super) fn solve_with_modes(&mut self, rungs: &Range<usize>, among: &Range<usize>, law: &Law) -> Articulated {
+    pub(super) fn solve_with_modes(&mut self, levels: &Range<usize>, among: &Range<usize>, law: &Law) -> Articulated {
         // Distal articulated inertias that are kept must be of the same kind, symmetric or not.
         let skew = law.friction == FrictionModel::Coulomb && (!self.outside.is_empty() || self.floor.slides());
         let floor = self.floor.inwards(among);
         if skew {
-            solve::<true>(&mut self.quads, rungs.clone(), self.hold, floor, law, &mut self.outside)
+            solve::<true>(&mut self.quads, levels.clone(), self.hold, floor, law, &mut self.outside)
         } else {
-            solve::<false>(&mut self.quads, rungs.clone(), self.hold, floor, law, &mut self.outside)
+            solve::<false>(&mut self.quads, levels.clone(), self.hold, floor, law, &mut self.outside)
         }
     }
 
-    /// Newton's method for some rungs, the corners `among` all that are theirs; returns the steps, at most `largest`, and whether they ended
+    /// Newton's method for some levels, the corners `among` all that are theirs; returns the steps, at most `largest`, and whether they ended
     /// in a solution.
     ///
     /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
@@ -176,19 +176,19 @@ impl PlanarEngine {
     fn newton_steps<S: Simd>(
         &mut self,
         simd: S,
-        rungs: Range<usize>,
+        levels: Range<usize>,
         among: Range<usize>,
         largest: u32,
         law: &Law,
     ) -> (u64, bool) {
         for step in 1..=largest {
             let mut agrees = true;
-            let felt = self.solve_and_ask(&rungs, &among, law, |_, agree| agrees &= agree);
+            let felt = self.solve_and_ask(&levels, &among, law, |_, agree| agrees &= agree);
             if agrees {
                 return (step.into(), true);
             }
             if law.friction == FrictionModel::Coulomb {
-                if step > BEFORE_PATH && rungs.len() == self.rungs {
+                if step > BEFORE_PATH && levels.len() == self.levels {
                     let solved = self.is_rounding(&among, law)
                         || self.follow_path(simd, Start::AtHand, law)
                         || self.follow_path(simd, Start::Open, law);
@@ -200,10 +200,10 @@ impl PlanarEngine {
                 self.floor.near(&among, &self.quads, |_, corners, _| corners.take_states());
                 continue;
             }
-            match if step <= WHOLE { Search::Whole } else { self.search(simd, &rungs, &among, &felt, law) } {
+            match if step <= WHOLE { Search::Whole } else { self.search(simd, &levels, &among, &felt, law) } {
                 Search::Done => return (step.into(), true),
                 Search::Part => {}
-                Search::Whole => self.accept(&rungs, &among),
+                Search::Whole => self.accept(&levels, &among),
             }
         }
         (largest.into(), false)
@@ -229,22 +229,22 @@ impl PlanarEngine {
 
     /// Makes the newest solution the iterate. The first states were a guess: any motion will do for one.
     #[inline(always)]
-    fn accept(&mut self, rungs: &Range<usize>, among: &Range<usize>) {
+    fn accept(&mut self, levels: &Range<usize>, among: &Range<usize>) {
         self.floor.near(among, &self.quads, |_, corners, mean| corners.accept(mean));
-        let quads = quads_of(rungs);
+        let quads = quads_of(levels);
         for (iterate, quad) in self.iterate[quads.clone()].iter_mut().zip(&self.quads[quads]) {
             *iterate = quad.mean;
         }
     }
 
-    /// way · B · way, from the iterate to the mean motion of some rungs and with the matrix B that it was solved with; and twice the kinetic
+    /// way · B · way, from the iterate to the mean motion of some levels and with the matrix B that it was solved with; and twice the kinetic
     /// energy of the mean motion (erg).
     #[inline(always)]
-    fn measure<S: Simd>(&self, simd: S, rungs: &Range<usize>, felt: &Articulated) -> [f64; 2] {
+    fn measure<S: Simd>(&self, simd: S, levels: &Range<usize>, felt: &Articulated) -> [f64; 2] {
         let zero = Four::splat(simd, 0.0);
         let (mut metric, mut kinetic) = (zero, zero);
         let mut before = Two::splat(simd, 0.0);
-        let quads = quads_of(rungs);
+        let quads = quads_of(levels);
         for (quad, iterate) in self.quads[quads.clone()].iter().zip(&self.iterate[quads]) {
             let way: Motions<S> = std::array::from_fn(|i| quad.mean[i].on(simd) - iterate[i].on(simd));
             let (inner, last) = inner(way[0], before);
@@ -257,13 +257,13 @@ impl PlanarEngine {
         [Lanes::from(metric).sum() + felt.metric(root), Lanes::from(kinetic).sum()]
     }
 
-    /// Lowers the cost between the iterate and the rungs' mean motion, and moves the iterate there.
+    /// Lowers the cost between the iterate and the levels' mean motion, and moves the iterate there.
     ///
     /// With d the way and B the matrix that the mean motion was solved with, f'(t) = −(1 − t) dᵀBd as long as all corners stay on the
     /// iterate's pieces. Of those that are on others at the end, these pieces' terms are taken out of it and what the law says at t is put in.
     #[inline(always)]
-    fn search<S: Simd>(&mut self, simd: S, rungs: &Range<usize>, among: &Range<usize>, felt: &Articulated, law: &Law) -> Search {
-        let [metric, kinetic] = self.measure(simd, rungs, felt);
+    fn search<S: Simd>(&mut self, simd: S, levels: &Range<usize>, among: &Range<usize>, felt: &Articulated, law: &Law) -> Search {
+        let [metric, kinetic] = self.measure(simd, levels, felt);
         let weight = self.gravity * self.time_step;
         if metric <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic * self.count as f64 {
             return Search::Done;
@@ -296,7 +296,7 @@ impl PlanarEngine {
         if found == 1.0 {
             return Search::Whole;
         }
-        let quads = quads_of(rungs);
+        let quads = quads_of(levels);
         for (iterate, quad) in self.iterate[quads.clone()].iter_mut().zip(&self.quads[quads]) {
             for (from, to) in iterate.iter_mut().zip(&quad.mean) {
                 let start = from.on(simd);
@@ -308,9 +308,9 @@ impl PlanarEngine {
     }
 }
 
-/// The quads of the rungs of some blocks.
-fn quads_of(rungs: &Range<usize>) -> Range<usize> {
-    rungs.start / 2..rungs.end.div_ceil(2)
+/// The quads of the levels of some blocks.
+fn quads_of(levels: &Range<usize>) -> Range<usize> {
+    levels.start / 2..levels.end.div_ceil(2)
 }
 
 #[cfg(test)]
@@ -334,7 +334,7 @@ mod tests {
         let experiment = experiment::experiment(&Source::from_text("long", &text)).unwrap();
         let mut engine = PlanarEngine::new(&experiment.robot, 1e-4).unwrap();
         engine.set_friction_model(friction);
-        assert!(engine.rungs > LONGEST_WHOLE && engine.outside.len() > 2);
+        assert!(engine.levels > LONGEST_WHOLE && engine.outside.len() > 2);
         (experiment, engine)
     }
 
@@ -363,9 +363,9 @@ mod tests {
         panic!("no step with changes");
     }
 
-    fn solve_part(engine: &mut PlanarEngine, rungs: Range<usize>) -> Articulated {
-        let (law, among) = (engine.law, engine.floor.among(&rungs));
-        engine.solve_with_modes(&rungs, &among, &law)
+    fn solve_part(engine: &mut PlanarEngine, levels: Range<usize>) -> Articulated {
+        let (law, among) = (engine.law, engine.floor.among(&levels));
+        engine.solve_with_modes(&levels, &among, &law)
     }
 
     fn means(engine: &PlanarEngine) -> Vec<[Lanes; 3]> {
@@ -381,18 +381,18 @@ mod tests {
     #[test]
     fn a_part_that_is_solved_again_stays_as_it_is() {
         let mut engine = landing();
-        let rungs = engine.rungs;
-        solve_part(&mut engine, 0..rungs);
+        let levels = engine.levels;
+        solve_part(&mut engine, 0..levels);
         let before = means(&engine);
-        for start in (0..rungs).step_by(BLOCK) {
-            solve_part(&mut engine, start..rungs.min(start + BLOCK));
+        for start in (0..levels).step_by(BLOCK) {
+            solve_part(&mut engine, start..levels.min(start + BLOCK));
             assert_eq!(means(&engine), before, "{start}");
         }
         // Forces on the root's block are felt there as when all is solved: the rest is in what is felt of it.
         engine.quads[1].torque = engine.quads[1].torque.map(|torque| torque + 1.0);
         solve_part(&mut engine, 0..BLOCK);
         let part = means(&engine);
-        solve_part(&mut engine, 0..rungs);
+        solve_part(&mut engine, 0..levels);
         let whole = means(&engine);
         assert_eq!(part[..BLOCK / 2], whole[..BLOCK / 2]);
         assert!(apart(&whole, &before, 0..BLOCK / 2) > 1e-3, "the force is felt");
@@ -401,9 +401,9 @@ mod tests {
     #[test]
     fn a_way_is_measured_by_what_made_it() {
         let mut engine = landing();
-        let rungs = engine.rungs;
-        for part in [0..rungs, BLOCK..3 * BLOCK] {
-            solve_part(&mut engine, 0..rungs);
+        let levels = engine.levels;
+        for part in [0..levels, BLOCK..3 * BLOCK] {
+            solve_part(&mut engine, 0..levels);
             for (iterate, quad) in engine.iterate.iter_mut().zip(&engine.quads) {
                 *iterate = quad.mean;
             }
@@ -414,7 +414,7 @@ mod tests {
             let felt = solve_part(&mut engine, part.clone());
             let [found, _] = dispatch!(engine.level, simd => engine.measure(simd, &part, &felt));
             let way = |k: usize, i: usize| engine.quads[k].mean[i] - engine.iterate[k][i];
-            let turns = way(5, 0) - way(5, 0).inner(way(4, 0).rung(1));
+            let turns = way(5, 0) - way(5, 0).inner(way(4, 0).level(1));
             let expected = torque * turns.sum() + force * way(7, 2).sum();
             // Seen: 3e-12, for corners are stiff: what rounding leaves of velocities is multiplied.
             assert!((found - expected).abs() < 1e-10 * expected, "{found} {expected}");

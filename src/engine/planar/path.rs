@@ -212,7 +212,7 @@ impl PlanarEngine {
     /// Goes to the path's end, or to where rounding loses it: on to infinity, or in circles about a point where several corners change.
     #[inline(always)]
     fn go_along_path(&mut self, pairs: &mut Vec<Pair>, start: Start, law: &Law) {
-        let (rungs, all) = (0..self.rungs, self.floor.all());
+        let (levels, all) = (0..self.levels, self.floor.all());
         // A body's mass at 1 cm/s as impulse.
         let pressed = self.mass / self.count as f64 / law.stiffness();
         pairs.clear();
@@ -220,7 +220,7 @@ impl PlanarEngine {
         pairs.extend(listed.map(|(place, corners)| Pair::new(place, corners, self.floor.excess(place, &self.quads), pressed)));
         if start == Start::Open {
             pairs.iter().for_each(|pair| self.floor.set_states(pair.place, [OPEN; 2]));
-            self.solve_with_modes(&rungs, &all, law);
+            self.solve_with_modes(&levels, &all, law);
             for (k, pair) in pairs.iter_mut().enumerate() {
                 pair.open(self.floor.excess(pair.place, &self.quads), k);
             }
@@ -240,7 +240,7 @@ impl PlanarEngine {
             pairs.iter_mut().for_each(|pair| pair.go(f64x2::splat(direction * first)));
             let crossed = pairs[k].cross(lane, border);
             self.floor.set_states(pairs[k].place, pairs[k].states);
-            self.solve_with_modes(&rungs, &all, law);
+            self.solve_with_modes(&levels, &all, law);
             pairs.iter_mut().for_each(|pair| pair.to = self.floor.excess(pair.place, &self.quads));
             direction = if pairs[k].goes_across(lane, crossed) { 1.0 } else { -1.0 };
         }
@@ -271,7 +271,7 @@ mod tests {
             );
             let experiment = experiment::experiment(&Source::from_text("rough", &text)).unwrap();
             let mut engine = PlanarEngine::new(&experiment.robot, 1e-4).unwrap();
-            let (law, whole) = (engine.law, 0..engine.rungs);
+            let (law, whole) = (engine.law, 0..engine.levels);
             let (mut voltages, mut touched, mut lost) = ([0.0; 5], 0, 0);
             for step in 0..experiment.steps {
                 let time = step as f64 * 1e-4;

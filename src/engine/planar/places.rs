@@ -26,7 +26,7 @@ impl PlanarEngine {
         let mut right = step(left, 0, &self.kept[0]);
         (nodes[self.root], nodes[self.root + 1]) = (left, right);
         // Outwards from the root on both sides: the far ends of the two bodies of each tree level.
-        for level in 1..self.rungs {
+        for level in 1..self.levels {
             let (of, lane) = (&self.kept[level / 2], 2 * (level % 2));
             if level <= self.root {
                 left = step(left, lane, of);

@@ -1,8 +1,8 @@
 //! The articulated-body recursion in the plane, two arms at a time.
 //!
 //! The chain hangs on its root: the first body if it is clamped, the one in the middle otherwise. The bodies at the same distance from the
-//! root stand on one rung, the left arm's in lane 0 and the right arm's in lane 1, and both arms are walked in the same instructions. The
-//! root has rung 0, lane 0. Where an arm is shorter its lane holds a body without mass, which changes nothing. Two rungs make a [`Quad`], for
+//! root stand on one level, the left arm's in lane 0 and the right arm's in lane 1, and both arms are walked in the same instructions. The
+//! root has level 0, lane 0. Where an arm is shorter its lane holds a body without mass, which changes nothing. Two levels make a [`Quad`], for
 //! what is done to each body for itself; if their number is odd, the last has bodies without mass.
 //!
 //! A spatial vector is (turn, x, z): of a motion (ω, v) of a body's reference point, of a force (moment about it, f). Turns count
@@ -200,21 +200,21 @@ struct Joints {
 }
 
 impl Arms {
-    /// Goes through the joints of the bodies outside, moves from a rung's other ends to its reference points, and adds the rung itself.
+    /// Goes through the joints of the bodies outside, moves from a level's other ends to its reference points, and adds the level itself.
     ///
     /// With c the first column of the inertia I outside, what is felt of it is I − c cᵀ/D, of which the first column is c · implicit/D:
     /// nothing is lost where a joint is soft. All that can be made of I before 1/D is known is made apart, for 1/D is waited for.
     #[inline(always)]
-    fn take<const SKEW: bool>(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, rung: usize) {
+    fn take<const SKEW: bool>(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, level: usize) {
         if SKEW {
-            return self.take_skew(through, across, quad, rung);
+            return self.take_skew(through, across, quad, level);
         }
         let Joints { inverse, implicit, own } = *through;
         let [wx, wz] = [-across[1], across[0]];
         let [c0, c1, c2, i11, i12, i22] = self.inertia;
-        let [half_x, half_z] = pair(&quad.half, rung);
-        let (mass, inertia) = (quad.mass.rung(rung), quad.inertia_at_reference.rung(rung));
-        let momentum = pair(&quad.momentum, rung);
+        let [half_x, half_z] = pair(&quad.half, level);
+        let (mass, inertia) = (quad.mass.level(level), quad.inertia_at_reference.level(level));
+        let momentum = pair(&quad.momentum, level);
         let [ux, uz] = [fma(wx, i11, wz * i12), fma(wx, i12, wz * i22)];
         let squares = fma(wx * wx, i11, fma(wz * wz, i22, (wx + wx) * wz * i12));
         let moved = fma(wx, c1, wz * c2);
@@ -238,13 +238,13 @@ impl Arms {
 
     /// The same where the inertia is not symmetric: with its first row r, what is felt of it is I − c rᵀ/D.
     #[inline(always)]
-    fn take_skew(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, rung: usize) {
+    fn take_skew(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, level: usize) {
         let Joints { inverse, implicit, own } = *through;
         let [wx, wz] = [-across[1], across[0]];
         let ([c0, r1, r2, i11, i12, i22], [c1, c2, i21]) = (self.inertia, self.lower);
-        let [half_x, half_z] = pair(&quad.half, rung);
-        let (mass, inertia) = (quad.mass.rung(rung), quad.inertia_at_reference.rung(rung));
-        let momentum = pair(&quad.momentum, rung);
+        let [half_x, half_z] = pair(&quad.half, level);
+        let (mass, inertia) = (quad.mass.level(level), quad.inertia_at_reference.level(level));
+        let momentum = pair(&quad.momentum, level);
         let squares = fma(wx * wx, i11, fma(wz * wz, i22, wx * wz * (i12 + i21)));
         let [row, column] = [fma(wx, r1, wz * r2), fma(wx, c1, wz * c2)];
         let [soft_row, soft_column] = [implicit - row, implicit - column];
@@ -270,7 +270,7 @@ impl Arms {
         ];
     }
 
-    /// Adds what corners do to the bodies of a rung.
+    /// Adds what corners do to the bodies of a level.
     #[inline(always)]
     fn touch<const SKEW: bool>(&mut self, by: &Self) {
         (0..6).for_each(|k| self.inertia[k] += by.inertia[k]);
@@ -280,18 +280,18 @@ impl Arms {
         (0..3).for_each(|k| self.force[k] += by.force[k]);
     }
 
-    /// Solves the joints at the rung's reference points.
+    /// Solves the joints at the level's reference points.
     #[inline(always)]
-    fn joints(&self, quad: &mut Quad, rung: usize) -> Joints {
-        let implicit = quad.implicit.rung(rung);
+    fn joints(&self, quad: &mut Quad, level: usize) -> Joints {
+        let implicit = quad.implicit.level(level);
         let pivot = self.inertia[0] + implicit;
         let inverse = f64x2::ONE / pivot;
-        let own = (quad.torque.rung(rung) + self.force[0]) * inverse;
-        quad.carried[0].set_rung(rung, implicit * inverse);
-        quad.carried[1].set_rung(rung, self.inertia[1] * inverse);
-        quad.carried[2].set_rung(rung, self.inertia[2] * inverse);
-        quad.own.set_rung(rung, own);
-        quad.pivot.set_rung(rung, pivot);
+        let own = (quad.torque.level(level) + self.force[0]) * inverse;
+        quad.carried[0].set_level(level, implicit * inverse);
+        quad.carried[1].set_level(level, self.inertia[1] * inverse);
+        quad.carried[2].set_level(level, self.inertia[2] * inverse);
+        quad.own.set_level(level, own);
+        quad.pivot.set_level(level, pivot);
         Joints { inverse, implicit, own }
     }
 
@@ -342,16 +342,16 @@ impl Articulated {
 
 /// What the root hangs on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Hold {
+pub(super) enum BaseJoint {
     /// Nothing.
     Free,
     /// The world.
     Clamped,
-    /// A hinge at its reference point, with the rung's own torque and implicit terms.
+    /// A hinge at its reference point, with the level's own torque and implicit terms.
     Hinged,
 }
 
-/// Rungs of a block, of which a part of a long chain is made; an even number.
+/// Levels of a block, of which a part of a long chain is made; an even number.
 pub(super) const BLOCK: usize = 8;
 
 /// What is felt at the outer end of a block of all that is further out; the default is nothing.
@@ -367,15 +367,15 @@ fn root_motion<const SKEW: bool>(
     chain: Arms,
     through: &Joints,
     root: &Quad,
-    hold: Hold,
+    hold: BaseJoint,
     mut floor: Inwards,
     law: &Law,
 ) -> (Articulated, Spatial) {
-    if hold == Hold::Clamped {
+    if hold == BaseJoint::Clamped {
         return Default::default();
     }
     let mut whole = chain.at_root::<SKEW>(through, root);
-    if hold == Hold::Hinged {
+    if hold == BaseJoint::Hinged {
         let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
         return (whole, [turn, 0.0, 0.0]);
     }
@@ -389,40 +389,40 @@ fn root_motion<const SKEW: bool>(
 
 /// Mean motions u of the chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as their states say.
 ///
-/// Of the `rungs` of some blocks only: bodies further in move as they did, and those further out are felt as they last were. What is
-/// felt goes to `outside`, by block, unless it is empty. Returns the chain as it is felt at the root, if that is among `rungs`.
+/// Of the `levels` of some blocks only: bodies further in move as they did, and those further out are felt as they last were. What is
+/// felt goes to `outside`, by block, unless it is empty. Returns the chain as it is felt at the root, if that is among `levels`.
 #[inline(always)]
 pub(super) fn solve<const SKEW: bool>(
     quads: &mut [Quad],
-    rungs: Range<usize>,
-    hold: Hold,
+    levels: Range<usize>,
+    hold: BaseJoint,
     mut floor: Inwards,
     law: &Law,
     outside: &mut [Outside],
 ) -> Articulated {
     let block_of = |end: usize| (end - 1) / BLOCK;
-    let mut end = rungs.end;
+    let mut end = levels.end;
     let Outside { arms: mut chain, mut through } = outside.get(block_of(end)).copied().unwrap_or_default();
-    while end > rungs.start {
-        let mut start = rungs.start;
+    while end > levels.start {
+        let mut start = levels.start;
         if let Some(outside) = outside.get_mut(block_of(end)) {
             *outside = Outside { arms: chain, through };
             start = BLOCK * block_of(end);
         }
         for k in (start.max(1)..end).rev() {
-            let (quad, rung) = (&mut quads[k / 2], k % 2);
-            chain.take::<SKEW>(&through, pair(&quad.across, rung), quad, rung);
+            let (quad, level) = (&mut quads[k / 2], k % 2);
+            chain.take::<SKEW>(&through, pair(&quad.across, level), quad, level);
             if let Some(by) = floor.take(k, law) {
                 chain.touch::<SKEW>(&by);
             }
-            through = chain.joints(quad, rung);
+            through = chain.joints(quad, level);
         }
         end = start;
     }
     let mut whole = Articulated::default();
-    let set = |quad: &mut Quad, rung: usize, mean: Spatials| (0..3).for_each(|k| quad.mean[k].set_rung(rung, mean[k]));
+    let set = |quad: &mut Quad, level: usize, mean: Spatials| (0..3).for_each(|k| quad.mean[k].set_level(level, mean[k]));
     let ([mut turn, mut x, mut z], mut across);
-    if let Some(inner) = rungs.start.checked_sub(1) {
+    if let Some(inner) = levels.start.checked_sub(1) {
         let quad = &quads[inner / 2];
         ([turn, x, z], across) = (pair(&quad.mean, inner % 2), pair(&quad.across, inner % 2));
     } else {
@@ -433,19 +433,19 @@ pub(super) fn solve<const SKEW: bool>(
         set(root, 0, [turn, x, z]);
         across = root_ends(root);
     }
-    for k in rungs.start.max(1)..rungs.end {
-        let (quad, rung) = (&mut quads[k / 2], k % 2);
-        let [a, b, c] = pair(&quad.carried, rung);
+    for k in levels.start.max(1)..levels.end {
+        let (quad, level) = (&mut quads[k / 2], k % 2);
+        let [a, b, c] = pair(&quad.carried, level);
         let carried = fma(b, across[1], fma(-c, across[0], a));
-        let on = fma(carried, turn, fma(-b, x, fma(-c, z, quad.own.rung(rung))));
+        let on = fma(carried, turn, fma(-b, x, fma(-c, z, quad.own.level(level))));
         (x, z) = (fma(-turn, across[1], x), fma(turn, across[0], z));
         turn = on;
-        set(quad, rung, [turn, x, z]);
-        across = pair(&quad.across, rung);
+        set(quad, level, [turn, x, z]);
+        across = pair(&quad.across, level);
     }
-    if rungs.end % 2 == 1 {
+    if levels.end % 2 == 1 {
         // Bodies without mass outside of the last follow it.
-        set(&mut quads[rungs.end / 2], 1, [turn, x, z]);
+        set(&mut quads[levels.end / 2], 1, [turn, x, z]);
     }
     whole
 }

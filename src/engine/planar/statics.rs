@@ -8,7 +8,7 @@
 use fearless_simd::{Simd, dispatch, prelude::*};
 use wide::f64x2;
 
-use super::contact::{Grip, Law};
+use super::contact::{FrictionCone, Law};
 use super::lanes::{Four, Lanes, Two, inner};
 use super::recursion::{Quad, direction};
 use super::{Engine, EngineError, PlanarEngine};
@@ -36,7 +36,7 @@ impl PlanarEngine {
         }
         self.prepare(voltages)?;
         let dynamic = self.quads.clone();
-        let mut grips = vec![Grip::new(f64x2::ZERO); self.rungs];
+        let mut grips = vec![FrictionCone::new(f64x2::ZERO); self.levels];
         self.floor.swap_grips(&mut grips);
         let hold = Lanes::splat(HOLD);
         for quad in &mut self.quads {

@@ -23,7 +23,7 @@ pub(in crate::engine) const GAUSS: [(f64, f64); 3] =
 
 /// One robot's extra torques, with their memory.
 #[derive(Debug, Clone)]
-pub(super) struct Beyond {
+pub(super) struct JointExtensions {
     softening: f64,
     friction: f64,
     /// ξ.
@@ -47,7 +47,7 @@ pub(super) struct Beyond {
     memory: Vec<[Lanes; LOSS_TIMES.len()]>,
 }
 
-impl Beyond {
+impl JointExtensions {
     /// None if the robot has nothing of it.
     pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Self> {
         if !extensions.bends_torque_law() && extensions.drag == 0.0 {
@@ -158,7 +158,7 @@ impl Beyond {
             }
             quad.torque = self.torque[k] + share * torque;
             quad.implicit = self.implicit[k] + share * slope;
-            before = quad.angle.rung(1);
+            before = quad.angle.level(1);
         }
     }
 
@@ -168,7 +168,7 @@ impl Beyond {
         let mut changed = 0.0_f64;
         for (k, quad) in quads.iter().enumerate() {
             let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
-            before = quad.mean[0].rung(1);
+            before = quad.mean[0].level(1);
             if self.friction != 0.0 {
                 for lane in 0..4 {
                     let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));

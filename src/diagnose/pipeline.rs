@@ -6,8 +6,8 @@ use super::fit::{BLOCK, Bench, Residuals};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Term};
+use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
-use super::tests::residual_tests;
 
 /// Joints per actuator that the search begins with, if the plant has so many: what finer ones change, re-tuned constants take up.
 const SEARCH_RESOLUTION: f64 = 10.0;
@@ -44,7 +44,7 @@ pub struct Outcome {
     /// The runs.
     pub split: Split,
     /// Moments of jumps as they were found.
-    pub unknowns: super::fit::Unknowns,
+    pub nuisances: super::fit::Nuisances,
     /// Which values counted.
     pub used: Vec<Vec<bool>>,
 }
@@ -77,7 +77,7 @@ pub fn diagnose(
     if spikes > 0 {
         calibrated = search.calibrated(start)?;
     }
-    let poor = poverty(plant, &search.split);
+    let poor = insufficient_data(plant, &search.split);
     let Causes { best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, poor.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
@@ -130,7 +130,7 @@ pub fn diagnose(
         _ => None,
     };
     let unexplained = if is_unexplained {
-        super::tests::describe(plant, &search.split, &search.bench.used, &best.residuals)
+        super::residual_tests::describe(plant, &search.split, &search.bench.used, &best.residuals)
     } else {
         Vec::new()
     };
@@ -188,7 +188,7 @@ pub fn diagnose(
         calibrated,
         extended: best,
         tied: tied.into_iter().map(|(_, trial)| trial.scored).collect(),
-        unknowns: search.bench.unknowns.clone(),
+        nuisances: search.bench.nuisances.clone(),
         used: search.bench.used.clone(),
         split: search.split,
     })
@@ -217,8 +217,8 @@ fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f
     let above = |scored: &Scored| scored.above(count);
     let (left, whole) = (above(&best), above(bare));
     let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
-    let handful = best.model().terms.len().max(2) as f64 - 1.0;
-    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / handful;
+    let cause_count = best.model().terms.len().max(2) as f64 - 1.0;
+    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / cause_count;
     let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
     let mut remark = None;
     if unnamed && !best.model().terms.is_empty() {
@@ -350,7 +350,7 @@ fn find(search: &mut Search, calibrated: &Scored, poor: bool) -> Result<Causes, 
 }
 
 /// Why the data cannot decide, if so.
-fn poverty(plant: &dyn Plant, split: &Split) -> Option<String> {
+fn insufficient_data(plant: &dyn Plant, split: &Split) -> Option<String> {
     let signals = plant.signals();
     if signals.len() < 2 || split.held.is_empty() {
         return Some(format!(
@@ -502,7 +502,7 @@ fn stage(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], scored: &Scored, 
             id: plant.signals()[run].id.clone(),
             role: if split.held.contains(&run) { "held-out" } else { "fit" },
             rmse_mm: rmse(plant, used, &scored.residuals, &[run]),
-            rmse_noises: (r.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
+            rmse_sigma: (r.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
         }
     });
     // Jackknife over runs.

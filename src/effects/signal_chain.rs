@@ -3,7 +3,7 @@
 use super::{Action, Applied, EFFECTS};
 
 /// Passes on the voltages of all actuators, step by step, with whatever memory that takes.
-pub trait Voltages: Send {
+pub trait SignalStage: Send {
     /// Comes to rest at constant `volts` (V), one per actuator, and turns them into what comes out.
     fn settle(&mut self, volts: &mut [f64]);
 
@@ -30,11 +30,11 @@ pub trait Voltages: Send {
 }
 
 /// All voltage effects of a run, in the order in which they act.
-pub struct Path {
-    stages: Vec<Box<dyn Voltages>>,
+pub struct SignalChain {
+    stages: Vec<Box<dyn SignalStage>>,
 }
 
-impl Path {
+impl SignalChain {
     /// The way through `effects` for a robot of `actuators` actuators in a run of `duration` (s).
     pub fn new(effects: &[Applied], actuators: usize, duration: f64) -> Self {
         let of =
