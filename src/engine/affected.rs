@@ -1,6 +1,6 @@
 //! An engine whose voltages pass effects on their way to the actuators.
 
-use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
+use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, PlanarBase};
 use crate::effects::SignalChain;
 
 /// Any engine behind a [`SignalChain`].
@@ -85,10 +85,6 @@ impl Engine for AffectedEngine {
         self.engine.advance()
     }
 
-    fn numerical_loss(&self) -> f64 {
-        self.engine.numerical_loss()
-    }
-
     /// The chain's memory, then the engine's state.
     fn save(&self) -> Result<Vec<f64>, EngineError> {
         let mut state = self.chain.save();
@@ -106,10 +102,6 @@ impl Engine for AffectedEngine {
 
     fn midpoint(&self) -> bool {
         self.engine.midpoint()
-    }
-
-    fn work_sums(&self) -> [f64; 2] {
-        self.engine.work_sums()
     }
 
     fn set_time_step(&mut self, time_step: f64, ahead: Option<f64>) -> Result<(), EngineError> {
@@ -134,12 +126,8 @@ impl Engine for AffectedEngine {
         self.engine.rewind(rest)
     }
 
-    fn kinetic_energy(&self) -> Option<f64> {
-        self.engine.kinetic_energy()
-    }
-
-    fn gravitational_energy(&self) -> Option<f64> {
-        self.engine.gravitational_energy()
+    fn energy_terms(&self) -> Option<EnergyTerms> {
+        self.engine.energy_terms()
     }
 
     fn actuators(&self) -> usize {

@@ -1,4 +1,4 @@
-//! The audit of energy: where it came from and where it went.
+//! The energy audit of a run: where energy came from and where it went.
 //!
 //! ```text
 //! E = Σ (m v²/2 + I ω²/2) + Σ m g z + Σ k θ²/2        kinetic, gravitational, elastic
@@ -10,18 +10,18 @@
 //! time step that is too long. Work over a step is torque times the mean of the rates before and after, which is exact for the change of
 //! kinetic energy at a fixed pose.
 //!
-//! The audit are kept in the plane of motion: displacements along y and turns about x and z, which contact makes by rounding, are left out.
+//! The audit is of the plane of motion: displacements along y and turns about x and z, which contact makes by rounding, are left out.
 
 use serde::Serialize;
 
-use super::{Contact, Engine, EngineError, JointState};
+use super::{Contact, EnergyTerms, Engine, EngineError, JointState};
 use crate::actuator::PiezoJoint;
 use crate::model::Robot;
 
-/// Steps between two looks at the state functions, and of an engine that works at the middle of steps, whose contact is not suspected.
-/// Work is added up in every step.
-const LOOK_EVERY: u64 = 8;
-const LOOK_EVERY_MIDPOINT: u64 = 64;
+/// Steps between audit samples of the state functions, of an explicit engine and of one that works at the middle of steps.
+/// Work is summed in every step.
+const SAMPLE_EVERY: u64 = 8;
+const SAMPLE_EVERY_MIDPOINT: u64 = 64;
 
 /// Pose and velocity of the base's centre of mass in the plane of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -91,7 +91,7 @@ struct Rise {
     link: Option<usize>,
 }
 
-/// Bodies of the chain as the audit need them.
+/// A body of the chain.
 #[derive(Debug, Clone, Copy)]
 struct Body {
     length: f64,
@@ -108,7 +108,7 @@ struct Motion {
     rate: f64,
 }
 
-/// Keeps the audit of one run.
+/// The energy audit of one run.
 #[derive(Debug)]
 pub struct EnergyAudit {
     bodies: Vec<Body>,
@@ -117,12 +117,12 @@ pub struct EnergyAudit {
     time_step: f64,
     motions: Vec<Motion>,
     contacts: Vec<Contact>,
-    /// State of the step before, or of the last look if the engine works at the middle of steps.
+    /// Joints of the step before, or of the last sample if the engine works at the middle of steps.
     before: JointState,
     begun: bool,
-    /// Steps until something is to be taken in, of an engine that works at the middle of steps.
+    /// Steps until the next sample, of an engine that works at the middle of steps.
     pause: u64,
-    /// [`Engine::work_sums`] of such an engine when something was last taken in.
+    /// [`EnergyTerms::work_sums`] at the last sample.
     work_sums_before: [f64; 2],
     ground_energy: f64,
     numerical_before: f64,
@@ -135,7 +135,7 @@ pub struct EnergyAudit {
 }
 
 impl EnergyAudit {
-    /// Opens the audit of a robot that is stepped by `time_step` (s).
+    /// The audit of a robot that is stepped by `time_step` (s).
     pub fn new(robot: &Robot, time_step: f64) -> Self {
         let thickness = robot.collision_thickness;
         let bodies: Vec<Body> = robot
@@ -165,7 +165,7 @@ impl EnergyAudit {
         }
     }
 
-    /// Takes in the state before a step, at `time` (s), after [`Engine::prepare`].
+    /// Takes the state before a step, at `time` (s), after [`Engine::prepare`].
     ///
     /// # Errors
     /// Whatever the engine reports when it is read.
@@ -174,35 +174,35 @@ impl EnergyAudit {
             self.pause -= 1;
             return Ok(());
         }
-        let midpoint = engine.midpoint();
-        let [electrical, heat] = self.work(engine, midpoint);
+        let terms = engine.energy_terms();
+        let [electrical, heat] = self.work(engine, terms.as_ref());
         if self.begun {
             let k = self.joint.stiffness;
             self.balance.electrical_in_erg += k * electrical;
             self.balance.damping_out_erg += k * self.joint.damping_time * heat;
         }
-        let every = if midpoint { LOOK_EVERY_MIDPOINT } else { LOOK_EVERY };
+        let every = if terms.is_some() { SAMPLE_EVERY_MIDPOINT } else { SAMPLE_EVERY };
         let since = engine.step() % every;
-        if midpoint {
+        if terms.is_some() {
             self.pause = every - since - 1;
         }
-        let looks = !self.begun || since == 0;
-        if looks || !midpoint {
+        let is_sample = !self.begun || since == 0;
+        if is_sample || terms.is_none() {
             self.before.clone_from(engine.joints());
         }
-        if looks {
-            self.look(time, engine)?;
+        if is_sample {
+            self.sample(time, engine, terms)?;
             self.begun = true;
         }
         Ok(())
     }
 
-    /// Work of the piezo moments since the last time over the stiffness, and heat over stiffness and damping time.
-    fn work(&mut self, engine: &mut dyn Engine, midpoint: bool) -> [f64; 2] {
+    /// Work of the piezo moments since the last call over the stiffness, and heat over stiffness and damping time.
+    fn work(&mut self, engine: &mut dyn Engine, terms: Option<&EnergyTerms>) -> [f64; 2] {
         let per_volt = self.joint.rest_angle_per_volt;
-        if midpoint {
+        if let Some(terms) = terms {
             // Torques and rates of the middle of the step: the rate is the turn over the step.
-            let sums = engine.work_sums();
+            let sums = terms.work_sums;
             let before = std::mem::replace(&mut self.work_sums_before, sums);
             return [(sums[0] - before[0]) * per_volt, sums[1] - before[1]];
         }
@@ -216,26 +216,26 @@ impl EnergyAudit {
         [electrical, heat]
     }
 
-    /// The balance of the last look.
+    /// The balance at the last sample.
     pub fn balance(&self) -> EnergyBalance {
         let limit = TOLERANCE * self.balance.largest_erg;
         let first = self.rises.iter().find(|rise| rise.height > limit);
         EnergyBalance { fault: first.map(|rise| EnergyFault { time_s: rise.time, link: rise.link }), ..self.balance }
     }
 
-    fn look(&mut self, time: f64, engine: &mut dyn Engine) -> Result<(), EngineError> {
-        let known = (engine.kinetic_energy(), engine.gravitational_energy());
-        let (kinetic, height) = if let (Some(kinetic), Some(height)) = known {
+    fn sample(&mut self, time: f64, engine: &mut dyn Engine, terms: Option<EnergyTerms>) -> Result<(), EngineError> {
+        let (kinetic, height) = if let Some(EnergyTerms { kinetic, gravitational: Some(height), .. }) = terms {
             (kinetic, height)
         } else {
             self.move_bodies(&engine.base()?);
             let [kinetic, height] = self.energies();
-            (known.0.unwrap_or(kinetic), known.1.unwrap_or(height))
+            (terms.map_or(kinetic, |terms| terms.kinetic), height)
         };
+        let numerical_loss = terms.map_or(0.0, |terms| terms.numerical_loss);
         let elastic = 0.5 * self.joint.stiffness * self.before.angles.iter().map(|a| a * a).sum::<f64>();
         if !self.begun {
             self.ground_energy = height;
-            self.numerical_before = engine.numerical_loss();
+            self.numerical_before = numerical_loss;
         }
         let b = &mut self.balance;
         b.kinetic_erg = kinetic;
@@ -244,7 +244,7 @@ impl EnergyAudit {
         let mechanical = kinetic + b.gravitational_erg + elastic;
         // A robot that falls or sags from rest has energies that add up to nothing.
         b.largest_erg = b.largest_erg.max(kinetic + elastic + b.gravitational_erg.abs());
-        b.numerical_out_erg = engine.numerical_loss() - self.numerical_before;
+        b.numerical_out_erg = numerical_loss - self.numerical_before;
         let account = mechanical - b.electrical_in_erg + b.damping_out_erg + b.numerical_out_erg;
         if !self.begun {
             (self.account, self.lowest) = (account, account);
@@ -296,7 +296,7 @@ impl EnergyAudit {
         Ok(())
     }
 
-    /// Walks along the chain from the base.
+    /// Forward kinematics, from the base to the far end.
     fn move_bodies(&mut self, base: &PlanarBase) {
         let (mut pitch, mut rate) = (base.pitch, base.pitch_rate);
         let (mut end, mut end_velocity) = (base.position, base.velocity);

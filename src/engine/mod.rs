@@ -20,6 +20,12 @@ use thiserror::Error;
 use crate::bullet::BulletError;
 use crate::model::ModelError;
 
+/// Bullet's limit on the product of two friction coefficients, which the planar engine keeps for equal friction.
+const LARGEST_FRICTION: f64 = 10.0;
+
+/// Gauss points along a body, from −1 to 1, with their weights: exact for the square of a linear speed of one sign.
+const GAUSS: [(f64, f64); 3] = [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+
 /// A simulation that went wrong.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -172,6 +178,19 @@ pub struct Contact {
     pub force: [f64; 2],
 }
 
+/// Energy as an engine that works at the middle of steps knows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnergyTerms {
+    /// Kinetic energy (erg).
+    pub kinetic: f64,
+    /// Gravitational energy (erg) from any level; absent where the motion of base and joints tells it as exactly.
+    pub gravitational: Option<f64>,
+    /// Sums over the joints and all steps of voltage times turn (V·rad) and of the turn's square over the step (rad²/s).
+    pub work_sums: [f64; 2],
+    /// Energy that the time stepping has dissipated since the engine was built (erg).
+    pub numerical_loss: f64,
+}
+
 /// A robot that can be stepped.
 pub trait Engine {
     /// Takes the voltages of the coming step (V), one per actuator.
@@ -244,11 +263,6 @@ pub trait Engine {
     /// Whatever the engine's library reports.
     fn advance(&mut self) -> Result<(), EngineError>;
 
-    /// Energy that the engine's time stepping is known to have taken since the engine was built (erg).
-    fn numerical_loss(&self) -> f64 {
-        0.0
-    }
-
     /// Everything that a later step depends on, as numbers for storing.
     ///
     /// # Errors
@@ -297,19 +311,8 @@ pub trait Engine {
         false
     }
 
-    /// Sums over the joints and all steps so far of voltage times turn (V·rad) and of the turn's square over the step (rad²/s), of an engine
-    /// that works at the middle of steps: the energy audit reads what they grow by.
-    fn work_sums(&self) -> [f64; 2] {
-        [0.0; 2]
-    }
-
-    /// Kinetic energy (erg), where it is more exactly known than from the motion of base and joints.
-    fn kinetic_energy(&self) -> Option<f64> {
-        None
-    }
-
-    /// The same of gravitational energy, from any level.
-    fn gravitational_energy(&self) -> Option<f64> {
+    /// What the engine knows of its energy more exactly than base and joints tell; `None` of an explicit engine.
+    fn energy_terms(&self) -> Option<EnergyTerms> {
         None
     }
 

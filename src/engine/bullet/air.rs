@@ -2,7 +2,7 @@
 
 use super::add;
 use crate::bullet::{LinkState, Wrench};
-use crate::engine::planar::GAUSS;
+use crate::engine::GAUSS;
 use crate::model::{AIR_DENSITY, Robot};
 
 /// What drag does to every body: `f = −½·ρ·C_d·w·v·|v|` per length, v normal to the body.

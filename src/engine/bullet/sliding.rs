@@ -2,7 +2,7 @@
 
 use super::add;
 use crate::bullet::{LinkState, Wrench};
-use crate::engine::planar::LARGEST_FRICTION;
+use crate::engine::LARGEST_FRICTION;
 use crate::model::{Mount, Robot, StickSlip, VISCOUS_REACH};
 
 /// One coefficient for each body, since Bullet has one for each collider: at the speed of its lowest edge, where viscous friction

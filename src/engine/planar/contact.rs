@@ -8,170 +8,16 @@
 
 use wide::f64x2;
 
-use super::FrictionModel;
 use super::lanes::fma;
-use super::recursion::{Arms, Spatials};
+use super::law::{ContactLaw, FrictionModel};
+use super::quad::{Arms, Spatials};
 
-/// Softness of contact, as a share of a body's inverse mass, of impacts and of steps of this length (s). Otherwise it is in inverse proportion to the step:
-/// under a force a corner gives way by the same speed whatever the step, 3·10⁻⁸ cm/s under half a body's weight. A robot that lies on many corners would rest on
-/// others at other steps, and on films of high friction strides would differ by 1 %. Ten times stiffer contact changes heights by 10⁻⁴ of them,
-/// three results on such films by 0.3 to 0.4 %.
-const SOFTNESS: f64 = 6e-7;
-const STEP_OF_SOFTNESS: f64 = 1e-4;
-/// Steps so short (s) are an instant, of an impact or next to one.
-const INSTANT: f64 = 2e-8;
-/// Largest change of a corner's vertical velocity in a step (cm/s) that is looked ahead for: more than the robots fall with.
-const LARGEST_CHANGE: f64 = 150.0;
-/// Share of a penetration that is pushed out per step, and the largest speed of it (cm/s): so slow that it makes no energy to speak of.
-const PUSH_OUT: f64 = 0.1;
+/// Largest speed at which a penetration is pushed out (cm/s): so slow that the energy made is negligible.
 const PUSH_OUT_SPEED: f64 = 0.01;
-/// Penetrations below this (cm) stay: what is pushed out under the robot's weight gains energy.
+/// Penetrations below this (cm) stay: pushing them out against the robot's weight would gain energy.
 const LEAST_DEPTH: f64 = 1e-5;
-/// Landings slower than this share of the speed from which on they cut steps are left to the step in any case.
-const SLOW: f64 = 0.01;
-/// The same share per second at most, where steps differ in length.
-const FASTEST_PUSH_OUT: f64 = 1e3;
-
 /// Approach speed (cm/s) below which nothing bounces, as in Bullet.
 const LEAST_BOUNCE: f64 = 0.2;
-
-/// How long (s) after a step no corner may pass the floor: those that come down slower than [`Law::landing_speed`], the others, and of these such as are
-/// about to land.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ahead {
-    pub(super) slow: f64,
-    pub(super) fast: f64,
-    pub(super) landing: f64,
-}
-
-impl Ahead {
-    /// The same for all.
-    pub(super) fn all(ahead: f64) -> Self {
-        Self { slow: ahead, fast: ahead, landing: ahead }
-    }
-}
-
-/// What all corners share.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Law {
-    time_step: f64,
-    /// Steps per second.
-    per_step: f64,
-    /// One over the time (s) from the middle of the step until when no corner may pass the floor.
-    per_ahead: f64,
-    /// The same of corners that come down faster than [`landing_speed`](Self::landing_speed).
-    per_ahead_fast: f64,
-    /// The same of those of them that are about to land.
-    per_ahead_landing: f64,
-    /// Share of a penetration that is pushed out per second.
-    push_out: f64,
-    /// Corners that come down faster (cm/s) cut the step where they land.
-    pub(super) landing_speed: f64,
-    /// Corners whose landing is nearer (s) at an impact are stopped with it: a step.
-    pub(super) at_once: f64,
-    /// Share of the step's end in the mean motion.
-    weight: f64,
-    /// 1/R (g).
-    stiffness: f64,
-    stiffness_of_impacts: f64,
-    /// Whether the step is an impact, or too short for anything else to happen in it.
-    pub(super) is_instant: bool,
-    frictionless: bool,
-    pub(super) friction: FrictionModel,
-}
-
-impl Law {
-    /// Step (s), and the gap (cm) that a corner at rest may close in it.
-    pub(super) fn reach(&self) -> (f64, f64) {
-        (self.time_step, LARGEST_CHANGE * self.time_step)
-    }
-
-    /// Steps per second.
-    pub(super) fn per_step(&self) -> f64 {
-        self.per_step
-    }
-
-    /// Makes the coming steps `time_step` (s) long, with that weight of their ends.
-    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: Ahead) {
-        (self.time_step, self.per_step, self.weight) = (time_step, 1.0 / time_step, weight);
-        let Ahead { slow, fast, landing } = ahead;
-        [self.per_ahead, self.per_ahead_fast, self.per_ahead_landing] =
-            [slow, fast, landing].map(|ahead| 1.0 / (0.5 * time_step + ahead));
-        self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
-        self.is_instant = fast == 0.0 || time_step <= INSTANT;
-        self.stiffness = self.stiffness_of_impacts * if self.is_instant { 1.0 } else { time_step / STEP_OF_SOFTNESS };
-    }
-
-    /// Open corners with these gaps in the step's middle (cm) and velocities along z (cm/s), if they go on so, that cut the step where they land: those
-    /// that come fast, and of others those that would be below the floor before the look-ahead stops them.
-    #[inline(always)]
-    pub(super) fn cuts(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
-        let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
-        fast | (velocity.simd_lt(f64x2::splat(-SLOW * self.landing_speed)) & gap.simd_lt(f64x2::ZERO))
-    }
-
-    /// One over the look-ahead (1/s) of corners with these gaps (cm) and velocities along z (cm/s).
-    #[inline(always)]
-    fn per_ahead(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
-        let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
-        if !fast.any() {
-            return f64x2::splat(self.per_ahead);
-        }
-        let lands = fma(velocity, f64x2::splat(self.at_once), gap).simd_lt(f64x2::ZERO);
-        let of_fast = lands.select(f64x2::splat(self.per_ahead_landing), f64x2::splat(self.per_ahead_fast));
-        fast.select(of_fast, f64x2::splat(self.per_ahead))
-    }
-
-    /// Makes contact a hundred times softer.
-    pub(super) fn soften(&mut self) {
-        self.stiffness *= 0.01;
-    }
-
-    /// 1/R (g).
-    pub(super) fn stiffness(&self) -> f64 {
-        self.stiffness
-    }
-
-    pub(super) fn new(time_step: f64, weight: f64, body_mass: f64, friction: FrictionModel) -> Self {
-        Self {
-            time_step,
-            per_step: 1.0 / time_step,
-            per_ahead: 1.0 / time_step,
-            per_ahead_fast: 1.0 / time_step,
-            per_ahead_landing: 1.0 / time_step,
-            push_out: PUSH_OUT / time_step,
-            landing_speed: f64::INFINITY,
-            at_once: 0.0,
-            weight,
-            stiffness: body_mass / SOFTNESS,
-            stiffness_of_impacts: body_mass / SOFTNESS,
-            is_instant: false,
-            frictionless: false,
-            friction,
-        }
-    }
-
-    /// A frictionless floor for displacements: no velocity before, everything near.
-    pub(super) fn statics(stiffness: f64) -> Self {
-        let friction = FrictionModel::Convex;
-        Self {
-            time_step: 1.0,
-            per_step: 1.0,
-            per_ahead: 1.0,
-            per_ahead_fast: 1.0,
-            per_ahead_landing: 1.0,
-            push_out: 0.0,
-            landing_speed: f64::INFINITY,
-            at_once: 0.0,
-            weight: 1.0,
-            stiffness,
-            stiffness_of_impacts: stiffness,
-            is_instant: false,
-            frictionless: true,
-            friction,
-        }
-    }
-}
 
 /// States of a corner, the linear pieces of the law. One that slides forward is pushed backward: −[`PUSHED_FORWARD`].
 pub(super) const OPEN: f64 = 0.0;
@@ -251,12 +97,12 @@ pub(super) struct Corners {
     /// From the bodies' reference points (cm).
     arm: [f64x2; 2],
     /// The last look at the floor that found one of them near, and the mask of those.
-    look: u64,
+    pass: u64,
     near: f64x2,
-    touch: ContactMode,
+    mode: ContactMode,
     /// The states that the newest solution asks for.
-    asked: ContactMode,
-    grip: FrictionCone,
+    required: ContactMode,
+    cone: FrictionCone,
     /// Mean velocity w* that stops them on the floor at the end (cm/s).
     target: [f64x2; 2],
     /// Mean velocity of the iterate (cm/s).
@@ -285,13 +131,13 @@ fn dot(a: [f64x2; 2], b: [f64x2; 2]) -> f64x2 {
 }
 
 impl Corners {
-    pub(super) fn new(grip: FrictionCone) -> Self {
-        Self { grip, ..Self::default() }
+    pub(super) fn new(cone: FrictionCone) -> Self {
+        Self { cone, ..Self::default() }
     }
 
     /// Changes the friction.
-    pub(super) fn set_grip(&mut self, grip: FrictionCone) {
-        self.grip = grip;
+    pub(super) fn set_cone(&mut self, cone: FrictionCone) {
+        self.cone = cone;
     }
 
     /// Prepares those of the mask `near`: what mean velocity stops them on the floor at the step's end. They go on in the states of the step before, if
@@ -299,7 +145,7 @@ impl Corners {
     ///
     /// From v to v⁺ at the ends of the step a corner's mean velocity in the pose of the middle is w v⁺ + (1 − w) v + (1 − 2 w) curve.
     #[inline(always)]
-    pub(super) fn place(&mut self, look: u64, near: f64x2, candidates: &Candidates, law: &Law) {
+    pub(super) fn place(&mut self, pass: u64, near: f64x2, candidates: &Candidates, law: &ContactLaw) {
         let Candidates { arm, gap, velocity: before, curve } = *candidates;
         let weight = f64x2::splat(law.weight);
         let ahead = gap * -law.per_ahead(gap, before[1]);
@@ -310,8 +156,8 @@ impl Corners {
             let out = (deep * f64x2::splat(law.push_out)).fast_min(f64x2::splat(PUSH_OUT_SPEED));
             gap.simd_gt(f64x2::ZERO).select(ahead, out)
         };
-        self.touch = self.touch(look - 1).of(near);
-        self.look = look;
+        self.mode = self.mode(pass - 1).of(near);
+        self.pass = pass;
         self.near = near;
         self.arm = arm;
         let uneven = f64x2::ONE - weight - weight;
@@ -320,14 +166,14 @@ impl Corners {
     }
 
     /// Takes stored states up again.
-    pub(super) fn restore(&mut self, touch: ContactMode, look: u64) {
-        (self.touch, self.look) = (touch, look);
+    pub(super) fn restore(&mut self, mode: ContactMode, pass: u64) {
+        (self.mode, self.pass) = (mode, pass);
         self.impulse = [f64x2::ZERO; 2];
     }
 
     /// Lets corners that reach the floor in this step leave it with the share `restitution` of the speed they come with (cm/s).
     #[inline(always)]
-    pub(super) fn bounce(&mut self, gap: f64x2, speed: f64x2, restitution: f64, law: &Law) {
+    pub(super) fn bounce(&mut self, gap: f64x2, speed: f64x2, restitution: f64, law: &ContactLaw) {
         if restitution <= 0.0 {
             return;
         }
@@ -340,31 +186,31 @@ impl Corners {
     /// Whether neither touches, of corners near the floor.
     #[inline(always)]
     pub(super) fn is_open(&self) -> bool {
-        self.touch.is_open()
+        self.mode.is_open()
     }
 
     /// The mask of those that are open.
     #[inline(always)]
     pub(super) fn open(&self) -> f64x2 {
-        self.touch.0.simd_eq(f64x2::ZERO)
+        self.mode.0.simd_eq(f64x2::ZERO)
     }
 
     /// The states, in the time of a look.
-    pub(super) fn touch(&self, look: u64) -> ContactMode {
-        if self.look == look { self.touch } else { ContactMode::default() }
+    pub(super) fn mode(&self, pass: u64) -> ContactMode {
+        if self.pass == pass { self.mode } else { ContactMode::default() }
     }
 
     /// Impulses of the floor on them over the step (dyn·s), in the time of a look.
-    pub(super) fn impulses(&self, look: u64, law: &Law) -> [f64x2; 2] {
-        if self.look == look { self.impulse.map(|part| part / f64x2::splat(law.weight)) } else { [f64x2::ZERO; 2] }
+    pub(super) fn impulses(&self, pass: u64, law: &ContactLaw) -> [f64x2; 2] {
+        if self.pass == pass { self.impulse.map(|part| part / f64x2::splat(law.weight)) } else { [f64x2::ZERO; 2] }
     }
 
     /// The law: states and impulses at the mean velocities `v`.
     #[inline(always)]
-    fn law(&self, v: [f64x2; 2], law: &Law) -> (ContactMode, [f64x2; 2]) {
+    fn law(&self, v: [f64x2; 2], law: &ContactLaw) -> (ContactMode, [f64x2; 2]) {
         let stiffness = f64x2::splat(law.stiffness);
         let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
-        let mu = self.grip.friction;
+        let mu = self.cone.friction;
         let sideways = pull[0].abs();
         let coulomb = law.friction == FrictionModel::Coulomb;
         let pressed = if coulomb { pull[1] } else { fma(mu, sideways, pull[1]) };
@@ -375,7 +221,7 @@ impl Corners {
         }
         let sticks = sideways.simd_le(mu * pull[1]) & touches;
         let slides = touches & !sticks;
-        let normal = if coulomb { pressed } else { pressed * self.grip.share };
+        let normal = if coulomb { pressed } else { pressed * self.cone.share };
         let push = (mu * normal).copysign(pull[0]);
         let impulse = [(sticks & pull[0]) | (slides & push), (sticks & pull[1]) | (slides & normal)];
         (ContactMode::new(sticks, slides, pull[0]), impulse)
@@ -383,26 +229,26 @@ impl Corners {
 
     /// Direction of the impulses of sliding corners.
     #[inline(always)]
-    fn slide(&self, touch: ContactMode) -> [f64x2; 2] {
-        [self.grip.slide[0].copysign(touch.0), self.grip.slide[1]]
+    fn slide(&self, mode: ContactMode) -> [f64x2; 2] {
+        [self.cone.slide[0].copysign(mode.0), self.cone.slide[1]]
     }
 
     /// a·b through the law's pieces: −dλ/dw = stiffness · (0, all, or the part along the slide).
     #[inline(always)]
-    fn product(&self, touch: ContactMode, a: [f64x2; 2], b: [f64x2; 2], law: &Law) -> f64x2 {
-        let d = self.slide(touch);
+    fn product(&self, mode: ContactMode, a: [f64x2; 2], b: [f64x2; 2], law: &ContactLaw) -> f64x2 {
+        let d = self.slide(mode);
         let along = dot(a, d) * dot(b, d);
-        f64x2::splat(law.stiffness) * ((touch.sticks() & dot(a, b)) | (touch.slides() & along))
+        f64x2::splat(law.stiffness) * ((mode.sticks() & dot(a, b)) | (mode.slides() & along))
     }
 
     /// Adds the corners' terms to their bodies' inertia and force.
     #[inline(always)]
-    pub(super) fn add_to(&self, bodies: &mut Arms, law: &Law) {
+    pub(super) fn add_to(&self, bodies: &mut Arms, law: &ContactLaw) {
         let stiffness = f64x2::splat(law.stiffness);
         let [ax, az] = self.arm;
         let [tx, tz] = self.target;
         let Arms { inertia, lower, force } = bodies;
-        let sticks = self.touch.sticks();
+        let sticks = self.mode.sticks();
         if sticks.any() {
             let k = sticks & stiffness;
             inertia[0] = fma(k, dot([ax, az], [ax, az]), inertia[0]);
@@ -416,11 +262,11 @@ impl Corners {
             force[1] = fma(k, tx, force[1]);
             force[2] = fma(k, tz, force[2]);
         }
-        let slides = self.touch.slides();
+        let slides = self.mode.slides();
         if slides.any() && law.friction == FrictionModel::Coulomb {
             // The impulse (±μ, 1) λ_n, with λ_n by the velocity across the floor alone.
             let k = slides & stiffness;
-            let along = self.grip.friction.copysign(self.touch.0);
+            let along = self.cone.friction.copysign(self.mode.0);
             let by = [fma(-az, along, ax), along, f64x2::ONE].map(|part| k * part);
             inertia[0] = fma(by[0], ax, inertia[0]);
             inertia[2] += by[0];
@@ -433,7 +279,7 @@ impl Corners {
             }
         } else if slides.any() {
             let k = slides & stiffness;
-            let [dx, dz] = self.slide(self.touch);
+            let [dx, dz] = self.slide(self.mode);
             // Velocity of the corner along d is row · (ω, v).
             let row = [fma(dz, ax, -(dx * az)), dx, dz];
             let stiff = row.map(|part| k * part);
@@ -454,23 +300,23 @@ impl Corners {
 
     /// Whether the bodies' motion `mean` asks for the states that it was solved with; the impulses belong to it then.
     #[inline(always)]
-    pub(super) fn agrees(&mut self, mean: &Spatials, law: &Law) -> bool {
-        (self.asked, self.impulse) = self.law(self.velocity_in(mean), law);
-        self.is_as_asked()
+    pub(super) fn agrees(&mut self, mean: &Spatials, law: &ContactLaw) -> bool {
+        (self.required, self.impulse) = self.law(self.velocity_in(mean), law);
+        self.modes_agree()
     }
 
-    fn is_as_asked(&self) -> bool {
-        !self.asked.0.simd_ne(self.touch.0).any()
+    fn modes_agree(&self) -> bool {
+        !self.required.0.simd_ne(self.mode.0).any()
     }
 
     /// How far the impulses (dyn·s) of the pieces that the bodies' motion `mean` was solved with, which has just been asked whether it
     /// [`agrees`](Self::agrees), are from the law's at most.
-    pub(super) fn mismatch(&self, mean: &Spatials, law: &Law) -> f64 {
+    pub(super) fn mismatch(&self, mean: &Spatials, law: &ContactLaw) -> f64 {
         let v = self.velocity_in(mean);
         let stiffness = f64x2::splat(law.stiffness);
         let pull = [(self.target[0] - v[0]) * stiffness, (self.target[1] - v[1]) * stiffness];
-        let (sticks, slides) = (self.touch.sticks(), self.touch.slides());
-        let push = (self.grip.friction * pull[1]).copysign(self.touch.0);
+        let (sticks, slides) = (self.mode.sticks(), self.mode.slides());
+        let push = (self.cone.friction * pull[1]).copysign(self.mode.0);
         let piece = [(sticks & pull[0]) | (slides & push), (sticks | slides) & pull[1]];
         (0..2).flat_map(|k| (piece[k] - self.impulse[k]).abs().to_array()).fold(0.0, f64::max)
     }
@@ -490,45 +336,45 @@ impl Corners {
     /// Of the corner in a lane, if it is near the floor: arm (cm) and coefficient of friction.
     pub(super) fn near(&self, lane: usize) -> Option<([f64; 2], f64)> {
         let is_near = self.near.to_array()[lane].to_bits() != 0;
-        is_near.then(|| (self.arm.map(|part| part.to_array()[lane]), self.grip.friction.to_array()[lane]))
+        is_near.then(|| (self.arm.map(|part| part.to_array()[lane]), self.cone.friction.to_array()[lane]))
     }
 
     /// The states.
     pub(super) fn states(&self) -> [f64; 2] {
-        self.touch.0.to_array()
+        self.mode.0.to_array()
     }
 
     /// Which of them the newest solution that was asked for leaves in their states.
     pub(super) fn agree(&self) -> [bool; 2] {
-        let (asked, states) = (self.asked.0.to_array(), self.states());
-        [0, 1].map(|lane| asked[lane] == states[lane])
+        let (required, states) = (self.required.0.to_array(), self.states());
+        [0, 1].map(|lane| required[lane] == states[lane])
     }
 
     /// Puts the corners in these states.
     #[inline(always)]
-    pub(super) fn set_states(&mut self, states: [f64; 2]) {
-        self.touch = ContactMode(f64x2::new(states));
+    pub(super) fn set_modes(&mut self, states: [f64; 2]) {
+        self.mode = ContactMode(f64x2::new(states));
     }
 
     /// Whether one of them slides.
     #[inline(always)]
     pub(super) fn slides(&self) -> bool {
-        self.touch.slides().any()
+        self.mode.slides().any()
     }
 
     /// Takes the bodies' motion `mean`, which has just been asked whether it [`agrees`](Self::agrees), as iterate.
     #[inline(always)]
     pub(super) fn accept(&mut self, mean: &Spatials) {
         self.velocity = self.velocity_in(mean);
-        self.touch = self.asked;
+        self.mode = self.required;
     }
 
     /// Takes the states that the newest solution asks for, under Coulomb's law. Of corners that slide and are asked to slide the other way the pieces in
     /// between are so narrow that they are passed over otherwise: such corners stick.
     #[inline(always)]
-    pub(super) fn take_states(&mut self) {
-        let turned = self.asked.slides() & self.asked.0.simd_eq(-self.touch.0);
-        self.touch = ContactMode(turned.select(f64x2::ONE, self.asked.0));
+    pub(super) fn adopt_required_modes(&mut self) {
+        let turned = self.required.slides() & self.required.0.simd_eq(-self.mode.0);
+        self.mode = ContactMode(turned.select(f64x2::ONE, self.required.0));
     }
 
     /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).
@@ -536,14 +382,14 @@ impl Corners {
     /// Of corners that do not: impulse along the way at its end, if the iterate's pieces went so far, and by how much it fell. The others are
     /// on the same pieces at both ends, and therefore between, for these are convex.
     #[inline(always)]
-    pub(super) fn aim(&mut self, mean: &Spatials, law: &Law) -> Option<[f64; 2]> {
+    pub(super) fn aim(&mut self, mean: &Spatials, law: &ContactLaw) -> Option<[f64; 2]> {
         let to = self.velocity_in(mean);
         self.step = [to[0] - self.velocity[0], to[1] - self.velocity[1]];
-        if self.is_as_asked() {
+        if self.modes_agree() {
             return None;
         }
         let left = [self.target[0] - to[0], self.target[1] - to[1]];
-        Some([left, self.step].map(|of| self.product(self.touch, of, self.step, law).reduce_add()))
+        Some([left, self.step].map(|of| self.product(self.mode, of, self.step, law).reduce_add()))
     }
 
     /// The iterate's velocity at the share `t` of the search.
@@ -555,16 +401,16 @@ impl Corners {
 
     /// impulse·step and its slope at the share `t` of the search.
     #[inline(always)]
-    pub(super) fn search(&self, t: f64, law: &Law) -> [f64x2; 2] {
-        let (touch, impulse) = self.law(self.velocity_at(t), law);
-        [dot(impulse, self.step), -self.product(touch, self.step, self.step, law)]
+    pub(super) fn search(&self, t: f64, law: &ContactLaw) -> [f64x2; 2] {
+        let (mode, impulse) = self.law(self.velocity_at(t), law);
+        [dot(impulse, self.step), -self.product(mode, self.step, self.step, law)]
     }
 
     /// Goes the share `t` of the search.
     #[inline(always)]
-    pub(super) fn go(&mut self, t: f64, law: &Law) {
+    pub(super) fn go(&mut self, t: f64, law: &ContactLaw) {
         self.velocity = self.velocity_at(t);
-        (self.touch, self.impulse) = self.law(self.velocity, law);
+        (self.mode, self.impulse) = self.law(self.velocity, law);
     }
 }
 
@@ -576,7 +422,7 @@ mod tests {
     /// then these must be linear in between.
     #[test]
     fn corners_that_stay_on_their_pieces_are_linear_on_the_way() {
-        let law = Law::new(1e-4, 0.5, 1.0, FrictionModel::Convex);
+        let law = ContactLaw::new(1e-4, 0.5, 1.0, FrictionModel::Convex);
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
         let start = Corners { near, ..Corners::new(FrictionCone::new(f64x2::splat(0.5))) };
         let (mut stay, mut change) = (0, 0);
@@ -611,8 +457,8 @@ mod tests {
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
         for friction in [0.0, 0.5] {
             let corners = Corners { near, ..Corners::new(FrictionCone::new(f64x2::splat(friction))) };
-            let (touch, impulse) = corners.law([f64x2::ZERO, f64x2::ONE], &Law::new(1e-4, 0.5, 1.0, FrictionModel::Convex));
-            assert_eq!((touch.0.to_array(), impulse.map(f64x2::to_array)), ([0.0; 2], [[0.0; 2]; 2]), "{friction}");
+            let (mode, impulse) = corners.law([f64x2::ZERO, f64x2::ONE], &ContactLaw::new(1e-4, 0.5, 1.0, FrictionModel::Convex));
+            assert_eq!((mode.0.to_array(), impulse.map(f64x2::to_array)), ([0.0; 2], [[0.0; 2]; 2]), "{friction}");
         }
     }
 }

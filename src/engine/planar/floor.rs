@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use wide::f64x2;
 
-use super::LARGEST_FRICTION;
-use super::contact::{Candidates, ContactMode, Corners, FrictionCone, Law};
+use super::contact::{Candidates, ContactMode, Corners, FrictionCone};
 use super::lanes::{Lanes, fma, pair};
-use super::recursion::{Arms, Quad, Spatials};
+use super::law::ContactLaw;
+use super::quad::{Arms, Quad, Spatials};
+use super::recursion::ContactTerms;
+use crate::engine::LARGEST_FRICTION;
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
 /// The corners of all bodies. Those that may touch in the step at hand are listed.
@@ -16,7 +18,7 @@ pub(super) struct Floor {
     /// Two places per level: at the reference points, then at the other ends.
     corners: Vec<Corners>,
     /// Of each level.
-    grips: Vec<FrictionCone>,
+    cones: Vec<FrictionCone>,
     surface: Option<Surface>,
     half_thickness: f64,
     /// Places, in their order.
@@ -24,7 +26,7 @@ pub(super) struct Floor {
     /// Those of them that change their states on the way of a search.
     changing: Vec<usize>,
     /// How many times corners were looked for.
-    looks: u64,
+    detection_pass: u64,
     /// See [`first_landing`](Self::first_landing).
     landing: f64,
     /// Impulses (dyn·s) of the parts of a step that was cut, of all corners; otherwise empty.
@@ -57,7 +59,7 @@ impl Surface {
     }
 
     /// Friction at the sliding speeds that the step begins with.
-    fn grip(&self, plain: FrictionCone, speed: f64x2) -> FrictionCone {
+    fn cone(&self, plain: FrictionCone, speed: f64x2) -> FrictionCone {
         let [a, b] = plain.friction();
         let [u, v] = speed.to_array();
         let friction = [self.stick_slip.friction(a, u), self.stick_slip.friction(b, v)];
@@ -68,18 +70,18 @@ impl Surface {
 impl Floor {
     /// Corners with the coefficients of friction of both bodies of each level, under boxes of twice `half_thickness` (cm).
     pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
-        let grips: Vec<FrictionCone> = frictions.iter().map(|pair| FrictionCone::new(f64x2::new(*pair))).collect();
-        let corners: Vec<Corners> = grips.iter().flat_map(|grip| [Corners::new(*grip); 2]).collect();
+        let cones: Vec<FrictionCone> = frictions.iter().map(|pair| FrictionCone::new(f64x2::new(*pair))).collect();
+        let corners: Vec<Corners> = cones.iter().flat_map(|cone| [Corners::new(*cone); 2]).collect();
         let places = || Vec::with_capacity(corners.len());
         Self {
             near: places(),
             changing: places(),
             of_parts: Vec::with_capacity(corners.len()),
             corners,
-            grips,
+            cones,
             surface,
             half_thickness,
-            looks: 0,
+            detection_pass: 0,
             landing: f64::INFINITY,
         }
     }
@@ -87,9 +89,9 @@ impl Floor {
     /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and with this velocity
     /// (cm/s) and acceleration at constant rates (cm/s²). Lanes without mass have no corners.
     #[inline(always)]
-    pub(super) fn find(&mut self, quads: &[Quad], levels: usize, height: f64, root: [[f64; 2]; 2], law: &Law) {
+    pub(super) fn find(&mut self, quads: &[Quad], levels: usize, height: f64, root: [[f64; 2]; 2], law: &ContactLaw) {
         self.near.clear();
-        self.looks += 1;
+        self.detection_pass += 1;
         self.landing = f64::INFINITY;
         let (step, reach) = law.reach();
         let (step, reach) = (f64x2::splat(step), f64x2::splat(reach));
@@ -167,7 +169,7 @@ impl Floor {
 
     /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.
     #[inline(always)]
-    fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], from: &Reference, law: &Law) {
+    fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], from: &Reference, law: &ContactLaw) {
         let near = near & from.there;
         if !near.any() {
             return;
@@ -177,9 +179,9 @@ impl Floor {
         let curve = [0, 1].map(|k| fma(-rate * rate, arm[k], from.acceleration[k]) * half_step);
         let gap = fma(curve[1], f64x2::splat(-0.25 * law.reach().0), from.gap + arm[1]);
         let velocity = [fma(-rate, arm[1], from.velocity[0]) - curve[0], fma(rate, arm[0], from.velocity[1]) - curve[1]];
-        self.corners[place].place(self.looks, near, &Candidates { arm, gap, velocity, curve }, law);
+        self.corners[place].place(self.detection_pass, near, &Candidates { arm, gap, velocity, curve }, law);
         if self.surface.is_some() {
-            self.feel_surface(place, gap, velocity, law);
+            self.apply_surface(place, gap, velocity, law);
         }
         self.near.push(place);
         let comes = near & self.corners[place].open() & law.cuts(gap, velocity[1]);
@@ -210,19 +212,19 @@ impl Floor {
     }
 
     /// Adds the impulses of a part of the step.
-    pub(super) fn end_part(&mut self, law: &Law) {
+    pub(super) fn end_part(&mut self, law: &ContactLaw) {
         for (sum, corners) in self.of_parts.iter_mut().zip(&self.corners) {
-            let impulses = corners.impulses(self.looks, law);
+            let impulses = corners.impulses(self.detection_pass, law);
             *sum = [0, 1].map(|k| sum[k] + impulses[k]);
         }
     }
 
     /// Prepares corners for a floor that is not plain.
     #[inline(never)]
-    fn feel_surface(&mut self, place: usize, gap: f64x2, velocity: [f64x2; 2], law: &Law) {
+    fn apply_surface(&mut self, place: usize, gap: f64x2, velocity: [f64x2; 2], law: &ContactLaw) {
         let Some(surface) = &self.surface else { return };
         let corners = &mut self.corners[place];
-        corners.set_grip(surface.grip(self.grips[place / 2], velocity[0]));
+        corners.set_cone(surface.cone(self.cones[place / 2], velocity[0]));
         corners.bounce(gap, velocity[1], surface.restitution, law);
     }
 
@@ -287,14 +289,14 @@ impl Floor {
 
     /// Puts the corners of a place in these states.
     #[inline(always)]
-    pub(super) fn set_states(&mut self, place: usize, states: [f64; 2]) {
-        self.corners[place].set_states(states);
+    pub(super) fn set_modes(&mut self, place: usize, states: [f64; 2]) {
+        self.corners[place].set_modes(states);
     }
 
     /// Listed corners, for the walk to the root.
     #[inline(always)]
-    pub(super) fn inwards(&self, among: &Range<usize>) -> Inwards<'_> {
-        Inwards { corners: &self.corners, near: &self.near[among.clone()] }
+    pub(super) fn tip_to_base<'a>(&'a self, among: &Range<usize>, law: &'a ContactLaw) -> TipToBase<'a> {
+        TipToBase { corners: &self.corners, near: &self.near[among.clone()], law }
     }
 
     /// Calls `each` with the levels of listed corners, with these and the mean motions of their bodies.
@@ -307,7 +309,7 @@ impl Floor {
 
     /// Prepares listed corners for a search: sums of what [`Corners::aim`] tells of those that change.
     #[inline(always)]
-    pub(super) fn aim(&mut self, among: &Range<usize>, quads: &[Quad], law: &Law) -> [f64; 2] {
+    pub(super) fn aim(&mut self, among: &Range<usize>, quads: &[Quad], law: &ContactLaw) -> [f64; 2] {
         self.changing.clear();
         let mut sums = [0.0; 2];
         for &place in &self.near[among.clone()] {
@@ -321,7 +323,7 @@ impl Floor {
 
     /// Impulse along the way and its slope at the share `t` of a search, summed over the corners that change, one after the other.
     #[inline(always)]
-    pub(super) fn search(&self, t: f64, law: &Law) -> [f64; 2] {
+    pub(super) fn search(&self, t: f64, law: &ContactLaw) -> [f64; 2] {
         self.changing.iter().fold([0.0; 2], |sum, &place| {
             let [along, slope] = self.corners[place].search(t, law);
             [sum[0] + along.reduce_add(), sum[1] + slope.reduce_add()]
@@ -329,10 +331,10 @@ impl Floor {
     }
 
     /// Impulses on the corners of one body over the step (dyn·s): at its reference point and at its other end.
-    pub(super) fn impulses_on(&self, level: usize, lane: usize, law: &Law) -> [[f64; 2]; 2] {
+    pub(super) fn impulses_on(&self, level: usize, lane: usize, law: &ContactLaw) -> [[f64; 2]; 2] {
         [2 * level, 2 * level + 1].map(|place| {
             let of_parts = self.of_parts.get(place).copied();
-            of_parts.unwrap_or_else(|| self.corners[place].impulses(self.looks, law)).map(|part| part.to_array()[lane])
+            of_parts.unwrap_or_else(|| self.corners[place].impulses(self.detection_pass, law)).map(|part| part.to_array()[lane])
         })
     }
 
@@ -342,43 +344,44 @@ impl Floor {
     }
 
     /// Sets friction to zero, or back to what it is.
-    pub(super) fn swap_grips(&mut self, other: &mut Vec<FrictionCone>) {
-        std::mem::swap(&mut self.grips, other);
+    pub(super) fn swap_cones(&mut self, other: &mut Vec<FrictionCone>) {
+        std::mem::swap(&mut self.cones, other);
         for (place, corners) in self.corners.iter_mut().enumerate() {
-            corners.set_grip(self.grips[place / 2]);
+            corners.set_cone(self.cones[place / 2]);
         }
     }
 
     /// Forgets all contact.
     pub(super) fn clear(&mut self) {
         self.near.clear();
-        self.looks += 1;
+        self.detection_pass += 1;
     }
 
     /// The states of all corners as numbers for storing: four per level, at the reference points and at the other ends.
     pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
-        self.corners.iter().flat_map(|corners| corners.touch(self.looks).saved())
+        self.corners.iter().flat_map(|corners| corners.mode(self.detection_pass).saved())
     }
 
     /// Takes the states up again.
     pub(super) fn restore(&mut self, saved: &[f64]) {
         for (corners, saved) in self.corners.iter_mut().zip(saved.as_chunks().0) {
-            corners.restore(ContactMode::restored(*saved), self.looks);
+            corners.restore(ContactMode::restored(*saved), self.detection_pass);
         }
     }
 }
 
 /// The corners that may touch, to be taken from the tips to the root.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Inwards<'a> {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TipToBase<'a> {
     corners: &'a [Corners],
     near: &'a [usize],
+    law: &'a ContactLaw,
 }
 
-impl Inwards<'_> {
+impl ContactTerms for TipToBase<'_> {
     /// Takes those of `level` off the end and returns what they add to the inertia and force of its bodies; none if all are open.
     #[inline(always)]
-    pub(super) fn take(&mut self, level: usize, law: &Law) -> Option<Arms> {
+    fn take(&mut self, level: usize) -> Option<Arms> {
         if self.near.last().is_none_or(|place| place / 2 != level) {
             return None;
         }
@@ -389,7 +392,7 @@ impl Inwards<'_> {
             self.near = rest;
             let corners = &self.corners[*place];
             if !corners.is_open() {
-                corners.add_to(&mut bodies, law);
+                corners.add_to(&mut bodies, self.law);
                 touch = true;
             }
         }

@@ -9,7 +9,8 @@
 use wide::f64x2;
 
 use super::lanes::Lanes;
-use super::recursion::Quad;
+use super::quad::Quad;
+use crate::engine::GAUSS;
 use crate::model::{AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
 
 /// Repetitions end when no torque of friction changes by more than this share of its moment, or fail after so many.
@@ -17,9 +18,6 @@ const FRICTION_ENOUGH: f64 = 1e-3;
 /// A joint slides fast at this multiple of the rate at which friction has 76 % of its moment.
 const FAST: f64 = 3.0;
 pub(super) const LARGEST_REPETITIONS: u32 = 200;
-/// Points of Gauss along a body, from −1 to 1, with their weights: exact for the square of a linear speed of one sign.
-pub(in crate::engine) const GAUSS: [(f64, f64); 3] =
-    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
 /// One robot's extra torques, with their memory.
 #[derive(Debug, Clone)]

@@ -14,9 +14,10 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::contact::Ahead;
 use super::lanes::{Four, Lanes, fma};
-use super::{EngineError, FrictionModel, PlanarEngine, set_implicit, weight_of};
+use super::law::{Ahead, FrictionModel};
+use super::step::{set_implicit, weight_of};
+use super::{EngineError, PlanarEngine};
 
 /// Corners that come down slower than with this acceleration (cm/s²) over a step do not cut it.
 const LEAST_ACCELERATION: f64 = 1e5;
@@ -47,7 +48,7 @@ impl PlanarEngine {
         }
     }
 
-    /// Makes the coming steps so long (s), as [`Law::set_time_step`](super::contact::Law::set_time_step).
+    /// Makes the coming steps so long (s), as [`ContactLaw::set_time_step`](super::law::ContactLaw::set_time_step).
     pub(super) fn set_length(&mut self, time_step: f64, ahead: Ahead) {
         self.weight = weight_of(self.numerical_damping, time_step);
         self.law.set_time_step(time_step, self.weight, ahead);
@@ -55,8 +56,8 @@ impl PlanarEngine {
             return;
         }
         self.time_step = time_step;
-        set_implicit(&mut self.quads, &self.joint, self.hold, self.weight, time_step);
-        if let Some(beyond) = &mut self.beyond {
+        set_implicit(&mut self.quads, &self.joint, self.base_joint, self.weight, time_step);
+        if let Some(beyond) = &mut self.extensions {
             beyond.set_time_step(time_step, &self.quads);
         }
     }
@@ -115,7 +116,7 @@ impl PlanarEngine {
     pub(super) fn landing_here<S: Simd>(&mut self, simd: S, least: f64) -> f64 {
         let zero = Four::splat(simd, 0.0);
         let (mut moment, mut speed) = (zero, zero);
-        for (quad, along) in self.quads.iter().zip(&mut self.kept) {
+        for (quad, along) in self.quads.iter().zip(&mut self.scratch) {
             let [x, z] = quad.along_now(simd);
             let lever = quad.lever.on(simd);
             moment = fma(lever, z, moment);
@@ -123,6 +124,6 @@ impl PlanarEngine {
             *along = [x.into(), z.into()];
         }
         let height = self.centre[1] - Lanes::from(moment).sum();
-        self.floor.landing(&self.quads, &self.kept, self.levels, [height, self.velocity[1] - Lanes::from(speed).sum()], least)
+        self.floor.landing(&self.quads, &self.scratch, self.levels, [height, self.velocity[1] - Lanes::from(speed).sum()], least)
     }
 }

@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::contact::Law;
 use super::lanes::{Four, Lanes, Two, fma, inner};
+use super::law::{ContactLaw, FrictionModel};
 use super::path::Start;
-use super::recursion::{Articulated, BLOCK, Motions, solve};
-use super::{EngineError, FrictionModel, PlanarEngine};
+use super::quad::Motions;
+use super::recursion::{Articulated, BLOCK, solve};
+use super::{EngineError, PlanarEngine};
 use crate::model::Mount;
 
 /// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured: 33 in a second of the paper's
@@ -58,7 +59,7 @@ enum Search {
 impl PlanarEngine {
     /// Finds the corners that may touch during the step.
     #[inline(always)]
-    pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &Law) {
+    pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &ContactLaw) {
         if self.mount == Mount::Ground {
             let (height, motion) = self.root_over_floor(simd);
             self.floor.find(&self.quads, self.levels, height, motion, law);
@@ -67,7 +68,7 @@ impl PlanarEngine {
 
     /// Solves the step's mean motion, with the corners that were found.
     #[inline(always)]
-    pub(super) fn solve_on_floor<S: Simd>(&mut self, simd: S, law: &Law) -> Result<(), EngineError> {
+    pub(super) fn solve_on_floor<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> Result<(), EngineError> {
         let iterations = self.newton(simd, law)?;
         if !self.floor.all().is_empty() {
             self.iterations += iterations;
@@ -77,9 +78,9 @@ impl PlanarEngine {
 
     /// Solves for the corners as they are placed; returns how many Newton steps it took.
     #[inline(always)]
-    fn newton<S: Simd>(&mut self, simd: S, law: &Law) -> Result<u64, EngineError> {
+    fn newton<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> Result<u64, EngineError> {
         let mut steps = 0;
-        if !self.outside.is_empty() {
+        if !self.distal.is_empty() {
             let (in_parts, done) = self.newton_in_parts(simd, law);
             if done {
                 return Ok(in_parts);
@@ -107,7 +108,7 @@ impl PlanarEngine {
     /// all others: a step for the whole chain, then as many as it takes for each part of it where corners change, and so on. Returns the
     /// steps, and whether they ended in a solution of the whole chain. Out of line, for short chains never come here.
     #[inline(never)]
-    fn newton_in_parts<S: Simd>(&mut self, simd: S, law: &Law) -> (u64, bool) {
+    fn newton_in_parts<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> (u64, bool) {
         simd.vectorize(
             #[inline(always)]
             || self.newton_rounds(simd, law),
@@ -115,23 +116,25 @@ impl PlanarEngine {
     }
 
     #[inline(always)]
-    fn newton_rounds<S: Simd>(&mut self, simd: S, law: &Law) -> (u64, bool) {
+    fn newton_rounds<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> (u64, bool) {
         let mut steps = 0;
         for _ in 0..ROUNDS {
             let (whole, among) = (0..self.levels, self.floor.all());
-            let mut asking = std::mem::take(&mut self.asking);
-            asking.fill(false);
-            self.solve_and_ask(&whole, &among, law, |level, agrees| asking[level / BLOCK] |= !agrees);
-            self.asking = asking;
+            let mut blocks_with_changed_modes = std::mem::take(&mut self.blocks_with_changed_modes);
+            blocks_with_changed_modes.fill(false);
+            self.solve_and_update_active_set(&whole, &among, law, |level, agrees| {
+                blocks_with_changed_modes[level / BLOCK] |= !agrees
+            });
+            self.blocks_with_changed_modes = blocks_with_changed_modes;
             steps += 1;
-            if !self.asking.contains(&true) {
+            if !self.blocks_with_changed_modes.contains(&true) {
                 return (steps, true);
             }
             self.accept(&whole, &among);
-            let mut end = self.asking.len();
-            while let Some(last) = self.asking[..end].iter().rposition(|asks| *asks) {
+            let mut end = self.blocks_with_changed_modes.len();
+            while let Some(last) = self.blocks_with_changed_modes[..end].iter().rposition(|asks| *asks) {
                 // With the next block further in, if there is one.
-                end = self.asking[..last].iter().rposition(|asks| !*asks).unwrap_or(0);
+                end = self.blocks_with_changed_modes[..last].iter().rposition(|asks| !*asks).unwrap_or(0);
                 let part = BLOCK * end..self.levels.min(BLOCK * (last + 1));
                 let among = self.floor.among(&part);
                 steps += self.newton_steps(simd, part, among, STEPS_IN_PART, law).0;
@@ -142,11 +145,11 @@ impl PlanarEngine {
 
     /// Solves for the states of the corners as they are, and calls `each` with their levels and whether the solution agrees with them.
     #[inline(always)]
-    pub(super) fn solve_and_ask(
+    pub(super) fn solve_and_update_active_set(
         &mut self,
         levels: &Range<usize>,
         among: &Range<usize>,
-        law: &Law,
+        law: &ContactLaw,
         mut each: impl FnMut(usize, bool),
     ) -> Articulated {
         let felt = self.solve_with_modes(levels, among, law);
@@ -156,14 +159,14 @@ impl PlanarEngine {
 
     /// Solves for the contact modes as they are.
     #[inline(always)]
-    pub(super) fn solve_with_modes(&mut self, levels: &Range<usize>, among: &Range<usize>, law: &Law) -> Articulated {
+    pub(super) fn solve_with_modes(&mut self, levels: &Range<usize>, among: &Range<usize>, law: &ContactLaw) -> Articulated {
         // Distal articulated inertias that are kept must be of the same kind, symmetric or not.
-        let skew = law.friction == FrictionModel::Coulomb && (!self.outside.is_empty() || self.floor.slides());
-        let floor = self.floor.inwards(among);
+        let skew = law.friction == FrictionModel::Coulomb && (!self.distal.is_empty() || self.floor.slides());
+        let floor = self.floor.tip_to_base(among, law);
         if skew {
-            solve::<true>(&mut self.quads, levels.clone(), self.hold, floor, law, &mut self.outside)
+            solve::<true>(&mut self.quads, levels.clone(), self.base_joint, floor, &mut self.distal)
         } else {
-            solve::<false>(&mut self.quads, levels.clone(), self.hold, floor, law, &mut self.outside)
+            solve::<false>(&mut self.quads, levels.clone(), self.base_joint, floor, &mut self.distal)
         }
     }
 
@@ -179,11 +182,11 @@ impl PlanarEngine {
         levels: Range<usize>,
         among: Range<usize>,
         largest: u32,
-        law: &Law,
+        law: &ContactLaw,
     ) -> (u64, bool) {
         for step in 1..=largest {
             let mut agrees = true;
-            let felt = self.solve_and_ask(&levels, &among, law, |_, agree| agrees &= agree);
+            let felt = self.solve_and_update_active_set(&levels, &among, law, |_, agree| agrees &= agree);
             if agrees {
                 return (step.into(), true);
             }
@@ -197,7 +200,7 @@ impl PlanarEngine {
                 if step == COULOMB_STEPS_IN_PART {
                     return (step.into(), false);
                 }
-                self.floor.near(&among, &self.quads, |_, corners, _| corners.take_states());
+                self.floor.near(&among, &self.quads, |_, corners, _| corners.adopt_required_modes());
                 continue;
             }
             match if step <= WHOLE { Search::Whole } else { self.search(simd, &levels, &among, &felt, law) } {
@@ -210,21 +213,21 @@ impl PlanarEngine {
     }
 
     /// Whether the newest solution is in the states that it asks for, but for rounding.
-    pub(super) fn is_solved(&mut self, among: &Range<usize>, law: &Law) -> bool {
+    pub(super) fn is_solved(&mut self, among: &Range<usize>, law: &ContactLaw) -> bool {
         let mut agrees = true;
         self.floor.near(among, &self.quads, |_, corners, mean| agrees &= corners.agrees(mean, law));
         agrees || self.is_rounding(among, law)
     }
 
     /// Whether the impulses of the newest solution are the law's but for rounding. Contact is stiff: what rounding leaves of velocities is multiplied.
-    fn is_rounding(&mut self, among: &Range<usize>, law: &Law) -> bool {
+    fn is_rounding(&mut self, among: &Range<usize>, law: &ContactLaw) -> bool {
         let (mut mismatch, mut largest, mut speed) = (0.0_f64, self.mass * self.gravity * self.time_step, 0.0_f64);
         self.floor.near(among, &self.quads, |_, corners, mean| {
             mismatch = mismatch.max(corners.mismatch(mean, law));
             largest = largest.max(corners.largest_impulse());
             speed = mean[1..].iter().flat_map(|part| part.abs().to_array()).fold(speed, f64::max);
         });
-        mismatch <= MISMATCH * largest + ROUNDING * speed * law.stiffness()
+        mismatch <= MISMATCH * largest + ROUNDING * speed * law.stiffness
     }
 
     /// Makes the newest solution the iterate. The first states were a guess: any motion will do for one.
@@ -262,7 +265,14 @@ impl PlanarEngine {
     /// With d the way and B the matrix that the mean motion was solved with, f'(t) = −(1 − t) dᵀBd as long as all corners stay on the
     /// iterate's pieces. Of those that are on others at the end, these pieces' terms are taken out of it and what the law says at t is put in.
     #[inline(always)]
-    fn search<S: Simd>(&mut self, simd: S, levels: &Range<usize>, among: &Range<usize>, felt: &Articulated, law: &Law) -> Search {
+    fn search<S: Simd>(
+        &mut self,
+        simd: S,
+        levels: &Range<usize>,
+        among: &Range<usize>,
+        felt: &Articulated,
+        law: &ContactLaw,
+    ) -> Search {
         let [metric, kinetic] = self.measure(simd, levels, felt);
         let weight = self.gravity * self.time_step;
         if metric <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic * self.count as f64 {
@@ -334,7 +344,7 @@ mod tests {
         let experiment = experiment::experiment(&Source::from_text("long", &text)).unwrap();
         let mut engine = PlanarEngine::new(&experiment.robot, 1e-4).unwrap();
         engine.set_friction_model(friction);
-        assert!(engine.levels > LONGEST_WHOLE && engine.outside.len() > 2);
+        assert!(engine.levels > LONGEST_WHOLE && engine.distal.len() > 2);
         (experiment, engine)
     }
 
@@ -425,7 +435,7 @@ mod tests {
     fn parts_lead_to_what_the_whole_chain_does() {
         let (experiment, mut engine) = long(FrictionModel::Convex);
         let (_, mut whole) = long(FrictionModel::Convex);
-        whole.outside.clear();
+        whole.distal.clear();
         let mut worst = 0.0_f64;
         for _ in 0..900 {
             whole.load(engine.step, &engine.save().unwrap()).unwrap();
@@ -446,7 +456,7 @@ mod tests {
     #[test]
     fn too_many_steps_are_a_failure_with_step_and_time() {
         let (experiment, mut engine) = long(FrictionModel::Convex);
-        engine.outside.clear();
+        engine.distal.clear();
         engine.largest_steps = 2;
         let error = (0..900).find_map(|_| try_step(&experiment, &mut engine).err()).expect("no failure").to_string();
         let (step, time) = (engine.step, engine.step as f64 * 1e-4);

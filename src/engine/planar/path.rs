@@ -24,8 +24,9 @@ use fearless_simd::Simd;
 use wide::f64x2;
 
 use super::PlanarEngine;
-use super::contact::{Corners, Law, OPEN, PUSHED_FORWARD, STICKS};
+use super::contact::{Corners, OPEN, PUSHED_FORWARD, STICKS};
 use super::lanes::fma;
+use super::law::ContactLaw;
 
 /// Changes of modes per place of corners near the floor after which the path is left. Seen: up to 11.
 const MOST_CHANGES: usize = 16;
@@ -135,7 +136,7 @@ impl Pair {
 
     /// The state beyond a border of a corner's cone.
     #[inline(always)]
-    fn beyond(&self, lane: usize, border: usize) -> f64 {
+    fn mode_beyond(&self, lane: usize, border: usize) -> f64 {
         let state = self.states[lane];
         if state == OPEN {
             PUSHED_FORWARD.copysign(-self.at[0].to_array()[lane])
@@ -180,7 +181,7 @@ impl Pair {
     #[inline(always)]
     fn cross(&mut self, lane: usize, border: usize) -> [f64; 2] {
         let crossed = self.borders[border].map(|part| part.to_array()[lane]);
-        self.enter(lane, self.beyond(lane, border));
+        self.enter(lane, self.mode_beyond(lane, border));
         crossed
     }
 
@@ -195,7 +196,7 @@ impl Pair {
 impl PlanarEngine {
     /// Follows a path to a solution of the whole chain's contact; whether it has come to one. Out of line, for few steps come here.
     #[inline(never)]
-    pub(super) fn follow_path<S: Simd>(&mut self, simd: S, start: Start, law: &Law) -> bool {
+    pub(super) fn follow_path<S: Simd>(&mut self, simd: S, start: Start, law: &ContactLaw) -> bool {
         self.paths += 1;
         let mut pairs = std::mem::take(&mut self.path);
         let solved = simd.vectorize(
@@ -211,15 +212,15 @@ impl PlanarEngine {
 
     /// Goes to the path's end, or to where rounding loses it: on to infinity, or in circles about a point where several corners change.
     #[inline(always)]
-    fn go_along_path(&mut self, pairs: &mut Vec<Pair>, start: Start, law: &Law) {
+    fn go_along_path(&mut self, pairs: &mut Vec<Pair>, start: Start, law: &ContactLaw) {
         let (levels, all) = (0..self.levels, self.floor.all());
         // A body's mass at 1 cm/s as impulse.
-        let pressed = self.mass / self.count as f64 / law.stiffness();
+        let pressed = self.mass / self.count as f64 / law.stiffness;
         pairs.clear();
         let listed = self.floor.listed();
         pairs.extend(listed.map(|(place, corners)| Pair::new(place, corners, self.floor.excess(place, &self.quads), pressed)));
         if start == Start::Open {
-            pairs.iter().for_each(|pair| self.floor.set_states(pair.place, [OPEN; 2]));
+            pairs.iter().for_each(|pair| self.floor.set_modes(pair.place, [OPEN; 2]));
             self.solve_with_modes(&levels, &all, law);
             for (k, pair) in pairs.iter_mut().enumerate() {
                 pair.open(self.floor.excess(pair.place, &self.quads), k);
@@ -239,7 +240,7 @@ impl PlanarEngine {
             let Some((k, lane, border)) = changes else { return };
             pairs.iter_mut().for_each(|pair| pair.go(f64x2::splat(direction * first)));
             let crossed = pairs[k].cross(lane, border);
-            self.floor.set_states(pairs[k].place, pairs[k].states);
+            self.floor.set_modes(pairs[k].place, pairs[k].states);
             self.solve_with_modes(&levels, &all, law);
             pairs.iter_mut().for_each(|pair| pair.to = self.floor.excess(pair.place, &self.quads));
             direction = if pairs[k].goes_across(lane, crossed) { 1.0 } else { -1.0 };
@@ -292,7 +293,7 @@ mod tests {
                     let path = means(&mut |engine| {
                         let all = engine.floor.all();
                         solved = dispatch!(engine.level, simd => {
-                            engine.solve_and_ask(&whole, &all, &law, |_, _| ());
+                            engine.solve_and_update_active_set(&whole, &all, &law, |_, _| ());
                             engine.follow_path(simd, begin, &law)
                         });
                     });

@@ -8,9 +8,10 @@
 use fearless_simd::{Simd, dispatch, prelude::*};
 use wide::f64x2;
 
-use super::contact::{FrictionCone, Law};
+use super::contact::FrictionCone;
 use super::lanes::{Four, Lanes, Two, inner};
-use super::recursion::{Quad, direction};
+use super::law::ContactLaw;
+use super::quad::{Quad, direction};
 use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
@@ -36,8 +37,8 @@ impl PlanarEngine {
         }
         self.prepare(voltages)?;
         let dynamic = self.quads.clone();
-        let mut grips = vec![FrictionCone::new(f64x2::ZERO); self.levels];
-        self.floor.swap_grips(&mut grips);
+        let mut cones = vec![FrictionCone::new(f64x2::ZERO); self.levels];
+        self.floor.swap_cones(&mut cones);
         let hold = Lanes::splat(HOLD);
         for quad in &mut self.quads {
             quad.implicit = quad.stiffness.map(|stiffness| stiffness.max(1.0));
@@ -53,7 +54,7 @@ impl PlanarEngine {
             (quad.mass, quad.inertia, quad.implicit) = (real.mass, real.inertia, real.implicit);
             quad.inertia_at_reference = real.inertia_at_reference;
         }
-        self.floor.swap_grips(&mut grips);
+        self.floor.swap_cones(&mut cones);
         self.floor.clear();
         match settled? {
             true => Ok(()),
@@ -64,7 +65,7 @@ impl PlanarEngine {
     #[inline(always)]
     fn settle_in_steps<S: Simd>(&mut self, simd: S, bodies: &[Quad]) -> Result<bool, EngineError> {
         let weight = (self.mass * self.gravity).max(f64::MIN_POSITIVE);
-        let law = Law::statics(weight / GIVE);
+        let law = ContactLaw::statics(weight / GIVE);
         let zero = Four::splat(simd, 0.0);
         for _ in 0..LARGEST_STEPS {
             let mut before = Two::splat(simd, 0.0);
@@ -73,10 +74,10 @@ impl PlanarEngine {
                 quad.along = direction(quad.angle);
                 quad.lay(simd);
                 let mass = body.mass.on(simd);
-                quad.load([zero, mass * self.pull[0], mass * self.pull[1]]);
+                quad.load([zero, mass * self.gravity_vector[0], mass * self.gravity_vector[1]]);
                 let (inner, last) = inner(quad.angle.on(simd), before);
                 quad.load_torque(-1.0, inner);
-                if let Some(beyond) = &self.beyond {
+                if let Some(beyond) = &self.extensions {
                     quad.torque += beyond.at_rest(k, quad, quad.angle - inner.into() - quad.rest_angle);
                 }
                 before = last;

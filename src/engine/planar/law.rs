@@ -1,0 +1,166 @@
+//! The law of contact as all corners share it in a step: friction model, step, look-ahead and compliance.
+
+use wide::f64x2;
+
+use super::lanes::fma;
+
+/// The law of friction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FrictionModel {
+    /// Coulomb's law, solved to rounding in every step.
+    #[default]
+    Coulomb,
+    /// Anitescu's convex relaxation. Sliding lifts a corner by μ·h·|v_t|, so that results over films of friction 2 to 4 are 10 % and more off
+    /// at steps of 10⁻⁴ s, and may need 10⁻⁶ s.
+    Convex,
+}
+
+/// Softness of contact, as a share of a body's inverse mass, of impacts and of steps of this length (s). Otherwise it is in inverse proportion to the step:
+/// under a force a corner gives way by the same speed whatever the step, 3·10⁻⁸ cm/s under half a body's weight. A robot that lies on many corners would rest on
+/// others at other steps, and on films of high friction strides would differ by 1 %. Ten times stiffer contact changes heights by 10⁻⁴ of them,
+/// three results on such films by 0.3 to 0.4 %.
+const SOFTNESS: f64 = 6e-7;
+const STEP_OF_SOFTNESS: f64 = 1e-4;
+/// Steps so short (s) are an instant, of an impact or next to one.
+const INSTANT: f64 = 2e-8;
+/// Largest change of a corner's vertical velocity in a step (cm/s) that is looked ahead for: more than the robots fall with.
+const LARGEST_CHANGE: f64 = 150.0;
+/// Share of a penetration that is pushed out per step.
+const PUSH_OUT: f64 = 0.1;
+/// Landings slower than this share of the speed from which on they cut steps are left to the step in any case.
+const SLOW: f64 = 0.01;
+/// The same share per second at most, where steps differ in length.
+const FASTEST_PUSH_OUT: f64 = 1e3;
+
+/// How long (s) after a step no corner may pass the floor: those that come down slower than [`ContactLaw::landing_speed`], the others, and of these such as are
+/// about to land.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ahead {
+    pub(super) slow: f64,
+    pub(super) fast: f64,
+    pub(super) landing: f64,
+}
+
+impl Ahead {
+    /// The same for all.
+    pub(super) fn all(ahead: f64) -> Self {
+        Self { slow: ahead, fast: ahead, landing: ahead }
+    }
+}
+
+/// What all corners share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ContactLaw {
+    time_step: f64,
+    /// Steps per second.
+    per_step: f64,
+    /// One over the time (s) from the middle of the step until when no corner may pass the floor.
+    per_ahead: f64,
+    /// The same of corners that come down faster than [`landing_speed`](Self::landing_speed).
+    per_ahead_fast: f64,
+    /// The same of those of them that are about to land.
+    per_ahead_landing: f64,
+    /// Share of a penetration that is pushed out per second.
+    pub(super) push_out: f64,
+    /// Corners that come down faster (cm/s) cut the step where they land.
+    pub(super) landing_speed: f64,
+    /// Corners whose landing is nearer (s) at an impact are stopped with it: a step.
+    pub(super) at_once: f64,
+    /// Share of the step's end in the mean motion.
+    pub(super) weight: f64,
+    /// 1/R (g).
+    pub(super) stiffness: f64,
+    stiffness_of_impacts: f64,
+    /// Whether the step is an impact, or too short for anything else to happen in it.
+    pub(super) is_instant: bool,
+    pub(super) frictionless: bool,
+    pub(super) friction: FrictionModel,
+}
+
+impl ContactLaw {
+    /// Step (s), and the gap (cm) that a corner at rest may close in it.
+    pub(super) fn reach(&self) -> (f64, f64) {
+        (self.time_step, LARGEST_CHANGE * self.time_step)
+    }
+
+    /// Steps per second.
+    pub(super) fn per_step(&self) -> f64 {
+        self.per_step
+    }
+
+    /// Makes the coming steps `time_step` (s) long, with that weight of their ends.
+    pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: Ahead) {
+        (self.time_step, self.per_step, self.weight) = (time_step, 1.0 / time_step, weight);
+        let Ahead { slow, fast, landing } = ahead;
+        [self.per_ahead, self.per_ahead_fast, self.per_ahead_landing] =
+            [slow, fast, landing].map(|ahead| 1.0 / (0.5 * time_step + ahead));
+        self.push_out = (PUSH_OUT / time_step).min(FASTEST_PUSH_OUT);
+        self.is_instant = fast == 0.0 || time_step <= INSTANT;
+        self.stiffness = self.stiffness_of_impacts * if self.is_instant { 1.0 } else { time_step / STEP_OF_SOFTNESS };
+    }
+
+    /// Open corners with these gaps in the step's middle (cm) and velocities along z (cm/s), if they go on so, that cut the step where they land: those
+    /// that come fast, and of others those that would be below the floor before the look-ahead stops them.
+    #[inline(always)]
+    pub(super) fn cuts(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
+        let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
+        fast | (velocity.simd_lt(f64x2::splat(-SLOW * self.landing_speed)) & gap.simd_lt(f64x2::ZERO))
+    }
+
+    /// One over the look-ahead (1/s) of corners with these gaps (cm) and velocities along z (cm/s).
+    #[inline(always)]
+    pub(super) fn per_ahead(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
+        let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
+        if !fast.any() {
+            return f64x2::splat(self.per_ahead);
+        }
+        let lands = fma(velocity, f64x2::splat(self.at_once), gap).simd_lt(f64x2::ZERO);
+        let of_fast = lands.select(f64x2::splat(self.per_ahead_landing), f64x2::splat(self.per_ahead_fast));
+        fast.select(of_fast, f64x2::splat(self.per_ahead))
+    }
+
+    /// Makes contact a hundred times softer.
+    pub(super) fn soften(&mut self) {
+        self.stiffness *= 0.01;
+    }
+
+    pub(super) fn new(time_step: f64, weight: f64, body_mass: f64, friction: FrictionModel) -> Self {
+        Self {
+            time_step,
+            per_step: 1.0 / time_step,
+            per_ahead: 1.0 / time_step,
+            per_ahead_fast: 1.0 / time_step,
+            per_ahead_landing: 1.0 / time_step,
+            push_out: PUSH_OUT / time_step,
+            landing_speed: f64::INFINITY,
+            at_once: 0.0,
+            weight,
+            stiffness: body_mass / SOFTNESS,
+            stiffness_of_impacts: body_mass / SOFTNESS,
+            is_instant: false,
+            frictionless: false,
+            friction,
+        }
+    }
+
+    /// A frictionless floor for displacements: no velocity before, everything near.
+    pub(super) fn statics(stiffness: f64) -> Self {
+        let friction = FrictionModel::Convex;
+        Self {
+            time_step: 1.0,
+            per_step: 1.0,
+            per_ahead: 1.0,
+            per_ahead_fast: 1.0,
+            per_ahead_landing: 1.0,
+            push_out: 0.0,
+            landing_speed: f64::INFINITY,
+            at_once: 0.0,
+            weight: 1.0,
+            stiffness,
+            stiffness_of_impacts: stiffness,
+            is_instant: false,
+            frictionless: true,
+            friction,
+        }
+    }
+}
