@@ -1,4 +1,4 @@
-//! An engine whose voltages pass effects on their way to the actuators.
+//! An engine behind an actuation signal chain.
 
 use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, PlanarBase};
 use crate::effects::SignalChain;
@@ -9,19 +9,19 @@ pub struct AffectedEngine {
     chain: SignalChain,
     time_step: f64,
     voltages: Vec<f64>,
-    /// Of one part of a step.
+    /// Voltages of one part of a step (V).
     piece: Vec<f64>,
 }
 
 impl AffectedEngine {
-    /// `engine`, which steps by `time_step` (s), behind a `chain` that has come to rest at the first voltages.
+    /// `engine`, which steps by `time_step` (s), behind a `chain` in equilibrium with the first voltages.
     pub fn new(engine: Box<dyn Engine>, chain: SignalChain, time_step: f64) -> Self {
         Self { engine, chain, time_step, voltages: Vec::new(), piece: Vec::new() }
     }
 }
 
 impl Engine for AffectedEngine {
-    /// The voltages pass once for every step, so this may be called once before every [`advance`](Engine::advance).
+    /// The signal chain advances with every call, so this is called once before every [`advance`](Engine::advance).
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
         EngineError::unless_voltages(voltages.len(), self.actuators())?;
         self.voltages.clear();
@@ -34,10 +34,10 @@ impl Engine for AffectedEngine {
         self.chain.parts()
     }
 
-    /// Each part passes on its own; the engine gets the mean of what comes out.
+    /// Each part passes the chain on its own; the engine gets the mean of the outputs.
     fn prepare_parts(&mut self, means: &[f64]) -> Result<(), EngineError> {
-        let parts = self.chain.parts();
-        let actuators = means.len() / parts;
+        let (parts, actuators) = (self.chain.parts(), self.actuators());
+        EngineError::unless_voltages(means.len(), parts * actuators)?;
         self.voltages.clear();
         self.voltages.resize(actuators, 0.0);
         for mean in means.chunks_exact(actuators) {

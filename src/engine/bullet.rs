@@ -1,30 +1,31 @@
-//! The reference's robot on Bullet, bit for bit, and what it may have beyond that.
+//! The reference's robot on Bullet, bit for bit, and the extensions of the model.
 //!
 //! # Extensions
 //!
-//! Without them the robot is the reference's, and nothing below is computed. With them:
+//! Without extensions the robot is the reference's, and none of this is computed. With them:
 //!
-//! - The torque law's own ([`Beyond`]), drag in air ([`Air`]) and friction that depends on speed ([`Sliding`]) act like the torque law: with
-//!   the state that a step begins with, which errs by the first order of the step. None of them keeps anything from step to step that a saved
-//!   state would lack, but the loss ladder, which is saved.
-//! - A mass fixed to the sheet changes mass, centre of mass and inertia of the body it sits on, exactly. Records stay those of the boxes.
-//! - A clamp that gives is a spring at the left end, in the constraint that holds the base. A spring of a stiff clamp would need steps
-//!   far shorter than the joints do, so it is implicit: any compliance goes with any step, and its damping by the step, a damping ratio of
-//!   ω h/2 on the clamp's share of a mode's energy, is of the first order too.
-//! - Restitution is Bullet's, with its threshold of 0.2 cm/s, but that a bounce goes off with the share of the approach speed alone: Bullet's
-//!   own adds the push out of the overlap to it. The approach speed counts what the step's forces add, so that a foot which the actuators
-//!   press down with more than 0.2 cm/s per step trembles; the planar engine takes the speed of the step's beginning.
+//! - Joint torques ([`JointExtensions`]), drag in air ([`Air`]) and friction that depends on speed ([`Sliding`]) act like the torque law: with
+//!   the state at the step's start, an error of first order in the step. Only the Prony chains have a memory; it is part of saved states.
+//! - A point mass changes mass, centre of mass and inertia of the body it is fixed to, exactly. Records stay those of the boxes.
+//! - A compliant clamp is a spring at the left end, in the constraint that holds the base. It is implicit, so any compliance is stable at any step; its
+//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step.
+//! - Restitution is Bullet's, with its threshold of 0.2 cm/s, without the push-out of the overlap that Bullet adds. The approach speed includes what the
+//!   step's forces add, so a foot that the actuators press down by more than 0.2 cm/s per step trembles; the planar engine takes the speed at the step's start.
 
 mod air;
+mod geometry;
+mod joint_extensions;
 mod sliding;
 
 use self::air::Air;
+use self::geometry::{add, base_pitch, boxes, cross, pitch, rotation};
+use self::joint_extensions::JointExtensions;
 use self::sliding::Sliding;
 use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
-use crate::bullet::{self, BaseState, BodyId, BoxLink, Ground, LinkState, Snapshot, SolverSettings, World, Wrench};
-use crate::model::{Extensions, LOSS_TIMES, Mount, RigidBody, Robot, Segment};
+use crate::bullet::{self, BaseState, BodyId, Ground, LinkState, Snapshot, SolverSettings, World, Wrench};
+use crate::model::{Mount, Robot};
 
 /// Collision margin of every box (cm), as PyBullet sets it for bodies built by its calls.
 const COLLISION_MARGIN: f64 = 0.001;
@@ -50,11 +51,10 @@ pub struct BulletEngine {
     state: JointState,
     links: Vec<LinkState>,
     touching: Vec<bullet::Contact>,
-    /// What the joints have beyond eq. 1, if anything.
-    beyond: Option<Beyond>,
+    extensions: Option<JointExtensions>,
     air: Option<Air>,
     sliding: Option<Sliding>,
-    /// How the bodies move and what acts on them, where the two before need it.
+    /// Motions of the boxes and wrenches on them, for drag and sliding friction.
     boxes: Vec<LinkState>,
     wrenches: Vec<Wrench>,
     /// From each body's centre of mass to its box's centre, along the body (cm); empty if they are the same.
@@ -71,7 +71,7 @@ impl BulletEngine {
         Self::with_settings(robot, time_step, &SolverSettings::pybullet(robot.material.gravity))
     }
 
-    /// The same with other solver settings.
+    /// [`new`](Self::new) with other solver settings.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -122,7 +122,7 @@ impl BulletEngine {
             state: JointState { angles: zeros(), rates: zeros(), torques: zeros(), motor_voltages: zeros() },
             links: Vec::with_capacity(joints),
             touching: Vec::new(),
-            beyond: Beyond::new(robot),
+            extensions: JointExtensions::new(robot),
             air: Air::new(robot),
             sliding,
             boxes: Vec::with_capacity(bodies.len()),
@@ -169,7 +169,7 @@ impl BulletEngine {
         Ok(base)
     }
 
-    /// Calls `put` with number and place (cm) of every node, with the links as they were read; returns the pitch of the last body.
+    /// Calls `put` with index and position (cm) of every node, from the links last read; returns the pitch of the last body (rad).
     fn place_nodes(&self, base: &BaseState, mut put: impl FnMut(usize, [f64; 3])) -> f64 {
         let p = base_pitch(base);
         let lever = 0.5 * self.lengths[0];
@@ -189,8 +189,8 @@ impl BulletEngine {
         p
     }
 
-    /// Drag, viscous friction and the coefficients of friction of the coming step.
-    fn meet_surroundings(&mut self) -> Result<(), EngineError> {
+    /// Sets drag, viscous friction and the coefficients of friction of the coming step.
+    fn apply_surroundings(&mut self) -> Result<(), EngineError> {
         if self.air.is_none() && self.sliding.is_none() {
             return Ok(());
         }
@@ -212,7 +212,7 @@ impl BulletEngine {
             sliding.push(&self.boxes, &mut self.wrenches);
             self.world.set_frictions(self.body, sliding.frictions(&self.boxes))?;
         }
-        // So far the forces act on the boxes' centres.
+        // Move the forces from the boxes' centres to the centres of mass.
         for ((wrench, body), &by) in self.wrenches.iter_mut().zip(&self.boxes).zip(&self.com_to_box) {
             add(&mut wrench.torque, cross(body.rotation.map(|row| row[0] * by), wrench.force));
         }
@@ -239,129 +239,11 @@ impl BulletEngine {
     }
 }
 
-/// Joints with more to them than eq. 1. Like the torque law it acts with the state of a step's beginning.
-struct Beyond {
-    extensions: Extensions,
-    link: f64,
-    /// Rest angle at 0 V of each joint (rad), and factor on its voltage.
-    rest_angles: Vec<f64>,
-    gains: Vec<f64>,
-    /// q_j of the loss ladder of each joint (rad).
-    loss: Vec<[f64; LOSS_TIMES.len()]>,
-    /// Largest elastic angle so far (rad), if joints harden with it.
-    largest: f64,
-}
-
-impl Beyond {
-    fn new(robot: &Robot) -> Option<Self> {
-        let e = &robot.extensions;
-        if !e.bends_torque_law() && e.rest_curvature.is_empty() && e.joint_gains.is_empty() {
-            return None;
-        }
-        let (joints, m) = (robot.joints(), robot.motors_per_actuator);
-        let of_joint = |i: usize| e.rest_curvature.get(i / m).map_or(0.0, |curvature| curvature * robot.link_length());
-        Some(Self {
-            link: robot.link_length(),
-            rest_angles: (0..joints).map(of_joint).collect(),
-            gains: (0..joints).map(|i| e.joint_gains.get(i).copied().unwrap_or(1.0)).collect(),
-            loss: if e.loss == 0.0 { Vec::new() } else { vec![[0.0; LOSS_TIMES.len()]; joints] },
-            largest: 0.0,
-            extensions: e.clone(),
-        })
-    }
-
-    /// Torque of joint `i` (dyn·cm); its voltage becomes the one that acts.
-    fn torque(&mut self, i: usize, joint: &PiezoJoint, angle: f64, rate: f64, voltage: &mut f64) -> f64 {
-        *voltage *= self.gains[i];
-        let angle = angle - self.rest_angles[i];
-        let delta = angle - joint.rest_angle_per_volt * *voltage;
-        if self.extensions.softening < 0.0 {
-            self.largest = self.largest.max(delta.abs());
-        }
-        let stored: f64 = self.loss.get(i).map_or(0.0, |ladder| ladder.iter().sum());
-        joint.torque(angle, rate, *voltage) + self.extensions.torque(joint.stiffness, self.link, delta, rate)
-            - joint.stiffness * self.extensions.loss * stored
-    }
-
-    /// Turns the loss ladder on by a step of `dt` (s) at the joints' rates.
-    fn remember(&mut self, rates: &[f64], dt: f64) {
-        for (ladder, rate) in self.loss.iter_mut().zip(rates) {
-            for (q, time) in ladder.iter_mut().zip(LOSS_TIMES) {
-                *q += dt * (rate - *q / time);
-            }
-        }
-    }
-}
-
-/// The bodies as boxes whose hinges stand in the faces between them.
-fn boxes(robot: &Robot, sliding: Option<&Sliding>) -> Vec<BoxLink> {
-    let (segments, bodies) = (robot.segments(), robot.rigid_bodies());
-    let Robot { material, collision_thickness: thickness, extensions, .. } = robot;
-    let left_to_com = |i: usize| bodies[i].middle * segments[i].length;
-    let boxes = segments.iter().zip(&bodies).enumerate().map(|(i, (segment, body))| {
-        // A link's frame stands in its joint, which is its left end and the right end of the link before.
-        BoxLink {
-            parent: i.checked_sub(2),
-            mass: body.mass,
-            inertia: inertia(segment, body, material.width, *thickness),
-            half_extents: [0.5 * segment.length, 0.5 * material.width, 0.5 * thickness],
-            com_to_box: [0.5 * segment.length - left_to_com(i), 0.0, 0.0],
-            parent_com_to_joint: [if i == 0 { 0.0 } else { segments[i - 1].length - left_to_com(i - 1) }, 0.0, 0.0],
-            joint_to_com: [if i == 0 { 0.0 } else { left_to_com(i) }, 0.0, 0.0],
-            axis: [0.0, 1.0, 0.0],
-            friction: sliding.map_or(segment.friction, |sliding| sliding.plain(i)),
-            restitution: extensions.restitution,
-            collision_margin: COLLISION_MARGIN,
-        }
-    });
-    boxes.collect()
-}
-
-/// Moments of inertia of a body that has more than its box; none of a plain one, which has Bullet's own.
-fn inertia(segment: &Segment, body: &RigidBody, width: f64, thickness: f64) -> Option<[f64; 3]> {
-    let of_box = |a: f64, b: f64| segment.mass / 12.0 * (a.powi(2) + b.powi(2));
-    // The masses stand on the x axis of the box.
-    let added = body.inertia - of_box(segment.length, thickness);
-    (body.mass != segment.mass).then(|| [of_box(width, thickness), body.inertia, of_box(segment.length, width) + added])
-}
-
-fn add(to: &mut [f64; 3], by: [f64; 3]) {
-    to.iter_mut().zip(by).for_each(|(to, by)| *to += by);
-}
-
-fn cross([ax, ay, az]: [f64; 3], [bx, by, bz]: [f64; 3]) -> [f64; 3] {
-    [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
-}
-
-/// Rotation of the base to the world, by rows.
-fn rotation(base: &BaseState) -> [[f64; 3]; 3] {
-    let [x, y, z, w] = base.orientation;
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-}
-
-/// Pitch about +y of a body whose x axis points along (x, y, z) in the world (rad): positive lowers the far end.
-///
-/// For motion in the plane this is atan2(−z, x). Out of it, where contact has tilted or turned the robot a little, it is the
-/// angle to the horizontal, which is what PyBullet's Euler angles give the reference; beyond 90° those fold back and this does not.
-fn pitch([x, y, z]: [f64; 3]) -> f64 {
-    (-z).atan2(x.hypot(y).copysign(x))
-}
-
-/// Pitch of the base, from the first column of its rotation: its x axis in the world.
-fn base_pitch(base: &BaseState) -> f64 {
-    let [qx, qy, qz, qw] = base.orientation;
-    pitch([1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz), 2.0 * (qx * qz - qw * qy)])
-}
-
 impl Engine for BulletEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
         EngineError::unless_voltages(voltages.len(), self.robot.actuators)?;
         let JointState { angles, rates, torques, motor_voltages } = &mut self.state;
-        let mut beyond = self.beyond.as_mut();
+        let mut extensions = self.extensions.as_mut();
         self.world.joint_states(self.body, angles, rates)?;
         let m = self.motors_per_actuator as f64;
         let mut sum = 0.0;
@@ -370,9 +252,9 @@ impl Engine for BulletEngine {
             let joints = actuator * self.motors_per_actuator..(actuator + 1) * self.motors_per_actuator;
             for i in joints {
                 motor_voltages[i] = motor_voltage;
-                torques[i] = match &mut beyond {
+                torques[i] = match &mut extensions {
                     None => self.joint.torque(angles[i], rates[i], motor_voltage),
-                    Some(beyond) => beyond.torque(i, &self.joint, angles[i], rates[i], &mut motor_voltages[i]),
+                    Some(extensions) => extensions.torque(i, &self.joint, angles[i], rates[i], &mut motor_voltages[i]),
                 };
                 // Zero for finite values, NaN otherwise: one test per step instead of one per joint.
                 sum += 0.0 * angles[i] + 0.0 * rates[i];
@@ -389,6 +271,9 @@ impl Engine for BulletEngine {
     /// that Bullet cached one step earlier. Velocities pair the joints' places with the velocities of the links' centres of mass,
     /// and the right end's takes a whole length of the last body as lever from there. All of this is how the reference records.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
+        for (what, given) in [("the nodes' positions", positions.len()), ("the nodes' velocities", velocities.len())] {
+            EngineError::unless_length(what, given, 3 * (self.lengths.len() + 1))?;
+        }
         let base = self.read_bodies()?;
         let last = self.place_nodes(&base, |node, place| positions[3 * node..3 * node + 3].copy_from_slice(&place));
         let p = base_pitch(&base);
@@ -433,6 +318,7 @@ impl Engine for BulletEngine {
     }
 
     fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError> {
+        EngineError::unless_length("the nodes' places", nodes.len(), self.lengths.len() + 1)?;
         let base = self.read_bodies()?;
         self.place_nodes(&base, |node, [x, _, z]| nodes[node] = [x, z]);
         Ok(())
@@ -474,11 +360,11 @@ impl Engine for BulletEngine {
     }
 
     fn advance(&mut self) -> Result<(), EngineError> {
-        self.meet_surroundings()?;
+        self.apply_surroundings()?;
         self.world.set_joint_torques(self.body, &self.state.torques)?;
         self.world.step(self.time_step)?;
-        if let Some(beyond) = &mut self.beyond {
-            beyond.remember(&self.state.rates, self.time_step);
+        if let Some(extensions) = &mut self.extensions {
+            extensions.advance(&self.state.rates, self.time_step);
         }
         let clamp = self.world.velocity_clamp(self.body)?;
         if clamp.hit() {
@@ -490,17 +376,18 @@ impl Engine for BulletEngine {
     }
 
     fn save(&self) -> Result<Vec<f64>, EngineError> {
-        let mut state: Vec<f64> = self.beyond.iter().flat_map(|beyond| beyond.loss.iter().flatten().copied()).collect();
+        let mut state: Vec<f64> =
+            self.extensions.iter().flat_map(|extensions| extensions.loss.iter().flatten().copied()).collect();
         state.extend(self.world.snapshot()?.into_vec());
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
-        let memory = self.beyond.as_ref().map_or(0, |beyond| beyond.loss.as_flattened().len());
+        let memory = self.extensions.as_ref().map_or(0, |extensions| extensions.loss.as_flattened().len());
         let (memory, world) = state.split_at_checked(memory).ok_or(EngineError::State)?;
         self.world.restore(&Snapshot::from_vec(world.to_vec()))?;
-        if let Some(beyond) = &mut self.beyond {
-            beyond.loss.as_flattened_mut().copy_from_slice(memory);
+        if let Some(extensions) = &mut self.extensions {
+            extensions.loss.as_flattened_mut().copy_from_slice(memory);
         }
         self.step = step;
         Ok(())
@@ -515,7 +402,7 @@ impl Engine for BulletEngine {
     }
 
     fn hardening_curvature(&self) -> f64 {
-        self.beyond.as_ref().map_or(0.0, |beyond| beyond.largest / beyond.link)
+        self.extensions.as_ref().map_or(0.0, |extensions| extensions.largest / extensions.link)
     }
 
     fn clamp_hits(&self) -> Option<ClampHits> {

@@ -5,10 +5,9 @@
 //! dE/dt = Σ k θ_V θ̇ − Σ k η θ̇² + P                    electrical work in, damping out, P: contact
 //! ```
 //!
-//! The first two powers are known from the torque law, eq. 1, so P is what is left over: friction and impacts make it negative. The world
-//! can only take energy that way, so whatever P adds above its lowest level so far came from nowhere: from the contact solver, or from a
-//! time step that is too long. Work over a step is torque times the mean of the rates before and after, which is exact for the change of
-//! kinetic energy at a fixed pose.
+//! The first two powers follow from the torque law, eq. 1, so P is the remainder. Friction and impacts make it negative; whatever the contact account ∫P dt
+//! gains above its lowest level so far, nothing supplied: it comes from the contact solver or from too long a time step. Work over a step is torque times the
+//! mean of the rates before and after, which is exact for the change of kinetic energy at a fixed pose.
 //!
 //! The audit is of the plane of motion: displacements along y and turns about x and z, which contact makes by rounding, are left out.
 
@@ -49,15 +48,15 @@ pub struct EnergyBalance {
     pub electrical_in_erg: f64,
     /// Heat in the joints.
     pub damping_out_erg: f64,
-    /// What the time stepping is known to have taken: the planar engine's damping of what alternates from step to step.
+    /// What the time stepping is known to have dissipated: the planar engine's numerical damping.
     pub numerical_out_erg: f64,
-    /// What friction, impacts and the clamp took out: all falls of the contact's account.
+    /// What friction, impacts and the clamp took out: all falls of the contact account.
     pub contact_out_erg: f64,
-    /// What contact gave: all rises of the same account. Time steps and soft contact make small ones that fall back at once.
+    /// What contact gave: all rises of the contact account. Time steps and compliant contact make small ones that fall back at once.
     pub contact_in_erg: f64,
     /// Largest sum of kinetic energy, elastic energy and the magnitude of the gravitational one.
     pub largest_erg: f64,
-    /// Largest rise of the contact's account above its lowest level before: energy that nothing supplied.
+    /// Largest rise of the contact account above its lowest level before: energy that nothing supplied.
     pub unsupplied_erg: f64,
     /// Where that rise first stood out, if it did.
     pub fault: Option<EnergyFault>,
@@ -83,7 +82,7 @@ pub struct EnergyFault {
 /// the kick that Bullet's contact gives the inchworm sequence at 10 Hz makes 0.8.
 pub const TOLERANCE: f64 = 0.01;
 
-/// A rise of the contact's account, when it was twice as high as the last one noted.
+/// A rise of the contact account; noted when it is twice as high as the last one.
 #[derive(Debug, Clone, Copy)]
 struct Rise {
     height: f64,

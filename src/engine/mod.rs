@@ -1,8 +1,7 @@
 //! Stepping a robot in time.
 //!
-//! An [`Engine`] knows one robot. Each step begins with [`prepare`](Engine::prepare), which takes the voltages and looks whether
-//! the joints are still numbers, and ends with [`advance`](Engine::advance); between the two the state before the step can be
-//! observed. The loop over steps lives in [`experiment::run`](crate::experiment::run).
+//! An [`Engine`] steps one robot. Each step begins with [`prepare`](Engine::prepare), which takes the voltages and checks that the joints are finite, and ends
+//! with [`advance`](Engine::advance); between the two the state before the step can be observed. The loop over steps is [`experiment::run`](crate::experiment::run).
 
 mod affected;
 mod bullet;
@@ -59,16 +58,16 @@ pub enum EngineError {
         /// The longest (s).
         longest: f64,
     },
-    /// An engine whose steps are all of one length.
+    /// Adaptive steps on an engine with a fixed step.
     #[error("this engine's steps are all of one length; adaptive steps need engine = \"planar\"")]
     FixedStep,
-    /// A time step that is no step.
+    /// A time step that is not positive.
     #[error("the time step is {time_step} s, but must be a positive number")]
     TimeStep {
         /// The step (s).
         time_step: f64,
     },
-    /// Not one voltage per actuator.
+    /// Another number of voltages than actuators.
     #[error("{given} voltages for a robot of {needed} actuators")]
     Voltages {
         /// How many there are.
@@ -76,19 +75,29 @@ pub enum EngineError {
         /// How many there must be.
         needed: usize,
     },
-    /// A result that finer steps still change.
+    /// A slice of the wrong length.
+    #[error("{given} numbers for {what}, which needs {needed}")]
+    Length {
+        /// What the slice is for.
+        what: &'static str,
+        /// Its length.
+        given: usize,
+        /// The length needed.
+        needed: usize,
+    },
+    /// A result that is not converged.
     #[error("{0}")]
     NotResolved(String),
-    /// A robot that comes to rest nowhere.
+    /// A robot without equilibrium.
     #[error("there is no equilibrium to start from: {reason}")]
     NoEquilibrium {
         /// Why.
         reason: String,
     },
-    /// A saved state that is not one of this robot.
+    /// A saved state of another robot.
     #[error("the state does not fit this robot")]
     State,
-    /// A coordinate is no longer a number.
+    /// A coordinate is not finite.
     #[error("the simulation diverged: {what} is {value} at step {step}, t = {time} s; try {}", shorter(*.stable_step))]
     NotFinite {
         /// The coordinate: a joint with its number, or the base.
@@ -109,12 +118,16 @@ impl EngineError {
         if time_step.is_finite() && time_step > 0.0 { Ok(()) } else { Err(Self::TimeStep { time_step }) }
     }
 
-    /// The same at a step and time (s) that are counted otherwise.
+    /// This error with another step and time (s).
     pub(crate) fn at(mut self, (at_step, at_time): (u64, f64)) -> Self {
         if let Self::NotConverged { step, time, .. } | Self::NotFinite { step, time, .. } = &mut self {
             (*step, *time) = (at_step, at_time);
         }
         self
+    }
+
+    fn unless_length(what: &'static str, given: usize, needed: usize) -> Result<(), Self> {
+        if given == needed { Ok(()) } else { Err(Self::Length { what, given, needed }) }
     }
 
     fn unless_voltages(given: usize, needed: usize) -> Result<(), Self> {
@@ -156,7 +169,7 @@ impl Clone for JointState {
     }
 }
 
-/// How often Bullet's limit on velocities was reached.
+/// Steps in which Bullet limited a velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClampHits {
     /// Steps after which a velocity stood at the limit.
@@ -178,12 +191,12 @@ pub struct Contact {
     pub force: [f64; 2],
 }
 
-/// Energy as an engine that works at the middle of steps knows it.
+/// Energies that an engine whose forces act at the middle of steps knows exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergyTerms {
     /// Kinetic energy (erg).
     pub kinetic: f64,
-    /// Gravitational energy (erg) from any level; absent where the motion of base and joints tells it as exactly.
+    /// Gravitational energy (erg) above an arbitrary level; absent for a clamped robot, where the motion of the joints gives it as exactly.
     pub gravitational: Option<f64>,
     /// Sums over the joints and all steps of voltage times turn (V·rad) and of the turn's square over the step (rad²/s).
     pub work_sums: [f64; 2],
@@ -199,12 +212,12 @@ pub trait Engine {
     /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number, [`EngineError::Voltages`] for too many or too few.
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError>;
 
-    /// Into how many equal parts of a step the voltages are better given, where they may jump within it: see [`prepare_parts`](Self::prepare_parts).
+    /// Number of equal parts of a step for which [`prepare_parts`](Self::prepare_parts) wants mean voltages, in steps with a jump of voltage.
     fn parts(&self) -> usize {
         1
     }
 
-    /// Takes the mean voltages (V) of [`parts`](Self::parts) equal parts of the coming step, one per actuator, part after part.
+    /// Takes the mean voltages (V) over [`parts`](Self::parts) equal parts of the coming step: parts × actuators values.
     ///
     /// # Errors
     /// As [`prepare`](Self::prepare).
@@ -219,10 +232,10 @@ pub trait Engine {
     /// reference records them, see [`Recording::velocities`](crate::recording::Recording::velocities).
     ///
     /// # Errors
-    /// [`EngineError::NotFinite`] if the base's position is not a number.
+    /// [`EngineError::NotFinite`] if the base's position is not finite, [`EngineError::Length`] for slices of another length.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError>;
 
-    /// Turns the velocities that [`nodes`](Self::nodes) gave into those of the nodes themselves (cm/s) between
+    /// Replaces the velocities that [`nodes`](Self::nodes) gave, in the reference's definition, by those of the nodes themselves (cm/s). Between
     /// [`prepare`](Self::prepare) and [`advance`](Self::advance).
     ///
     /// # Errors
@@ -231,13 +244,13 @@ pub trait Engine {
         Ok(())
     }
 
-    /// Places of the nodes alone, x and z (cm), at little cost: for what is followed at every step.
+    /// x and z of the nodes (cm), N·m + 2 pairs, at a small fraction of a step's cost.
     ///
     /// # Errors
     /// As [`nodes`](Self::nodes).
     fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError>;
 
-    /// Time (s) in which the first corner that comes down faster than `least` (cm/s) lands, if all go on as they move now; infinite where none does.
+    /// Time (s) until the first corner that comes down faster than `least` (cm/s) lands, at constant velocities; infinite if none does.
     fn landing(&mut self, _least: f64) -> f64 {
         f64::INFINITY
     }
@@ -263,7 +276,7 @@ pub trait Engine {
     /// Whatever the engine's library reports.
     fn advance(&mut self) -> Result<(), EngineError>;
 
-    /// Everything that a later step depends on, as numbers for storing.
+    /// The complete state, as numbers for storing.
     ///
     /// # Errors
     /// Whatever the engine's library reports.
@@ -275,20 +288,19 @@ pub trait Engine {
     /// If the numbers are not a state of this robot; nothing is changed then.
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError>;
 
-    /// Makes the coming steps `time_step` (s) long. With `ahead` they are not cut where corners land, and no corner may come so low that it would be
-    /// under the floor `ahead` (s) after the step.
-    /// What is prepared is prepared for the old step.
+    /// Sets the length of the coming steps (s). With `ahead` they are not cut where corners land, and contact looks `ahead` (s) beyond the step's end. Comes
+    /// before [`prepare`](Self::prepare).
     ///
     /// # Errors
-    /// [`EngineError::FixedStep`] of an engine whose steps are all of one length.
+    /// [`EngineError::FixedStep`] of an engine with a fixed step, [`EngineError::TimeStep`] for a step that is not positive.
     fn set_time_step(&mut self, _time_step: f64, _ahead: Option<f64>) -> Result<(), EngineError> {
         Err(EngineError::FixedStep)
     }
 
-    /// Counts the coming steps on from `step`.
+    /// Sets the number of steps taken.
     fn set_step(&mut self, _step: u64) {}
 
-    /// Adds to `into` what [`rewind`](Self::rewind) needs for taking the coming steps again, with the voltages prepared anew.
+    /// Appends to `into` what [`rewind`](Self::rewind) needs to take the coming steps again, with voltages prepared anew.
     ///
     /// # Errors
     /// Whatever the engine's library reports.
@@ -305,13 +317,12 @@ pub trait Engine {
         self.load(self.step(), checkpoint)
     }
 
-    /// Whether drive, springs and dampers act at the middle of a step. Otherwise they act as in the reference: at its start, with the
-    /// voltages of the step before.
+    /// True if drive, springs and dampers act at the middle of a step; otherwise they act as in the reference, at its start with the voltages of the step before.
     fn midpoint(&self) -> bool {
         false
     }
 
-    /// What the engine knows of its energy more exactly than base and joints tell; `None` of an explicit engine.
+    /// Exact energies for the energy audit; `None` of an explicit engine.
     fn energy_terms(&self) -> Option<EnergyTerms> {
         None
     }
@@ -327,6 +338,6 @@ pub trait Engine {
         0.0
     }
 
-    /// Whether, when and how often the engine limited a velocity.
+    /// When and how often the engine limited a velocity; `None` if never.
     fn clamp_hits(&self) -> Option<ClampHits>;
 }

@@ -5,7 +5,7 @@ use crate::bullet::{LinkState, Wrench};
 use crate::engine::GAUSS;
 use crate::model::{AIR_DENSITY, Robot};
 
-/// What drag does to every body: `f = −½·ρ·C_d·w·v·|v|` per length, v normal to the body.
+/// Drag of every body: `f = −½·ρ·C_d·w·v·|v|` per length, v normal to the body.
 pub(super) struct Air {
     /// ½ ρ C_d w (g/cm²).
     drag: f64,
@@ -13,14 +13,14 @@ pub(super) struct Air {
 }
 
 impl Air {
-    /// None without drag.
+    /// `None` without drag.
     pub(super) fn new(robot: &Robot) -> Option<Self> {
         let drag = 0.5 * AIR_DENSITY * robot.extensions.drag * robot.material.width;
         let half_lengths = robot.segments().iter().map(|segment| 0.5 * segment.length).collect();
         (drag != 0.0).then_some(Self { drag, half_lengths })
     }
 
-    /// Adds to `wrenches` what acts on the boxes that move like `boxes`.
+    /// Adds the drag on boxes with these motions to `wrenches`.
     pub(super) fn push(&self, boxes: &[LinkState], wrenches: &mut [Wrench]) {
         for ((body, half), wrench) in boxes.iter().zip(&self.half_lengths).zip(wrenches) {
             let axis = |k: usize| body.rotation.map(|row| row[k]);

@@ -5,8 +5,7 @@ use crate::bullet::{LinkState, Wrench};
 use crate::engine::LARGEST_FRICTION;
 use crate::model::{Mount, Robot, StickSlip, VISCOUS_REACH};
 
-/// One coefficient for each body, since Bullet has one for each collider: at the speed of its lowest edge, where viscous friction
-/// acts too.
+/// One coefficient per body, as Bullet has one per collider: at the sliding speed of its lowest edge, where viscous friction acts too.
 pub(super) struct Sliding {
     law: StickSlip,
     plain: Vec<f64>,
@@ -16,7 +15,7 @@ pub(super) struct Sliding {
 }
 
 impl Sliding {
-    /// None if friction does not depend on speed.
+    /// `None` if friction does not depend on speed.
     pub(super) fn new(robot: &Robot) -> Option<Self> {
         let law = robot.extensions.stick_slip;
         if law == StickSlip::OFF || robot.mount != Mount::Ground {
@@ -39,14 +38,14 @@ impl Sliding {
         self.plain[i]
     }
 
-    /// How far the lowest edge of a box is below its centre (cm), and the speed of that edge along x (cm/s).
+    /// Depth of a box's lowest edge below its centre (cm), and that edge's velocity along x (cm/s).
     fn edge(&self, i: usize, body: &LinkState) -> (f64, f64) {
         let [_, _, [along, _, up]] = body.rotation;
         let below = self.half_lengths[i] * along.abs() + self.half_thickness * up.abs();
         (below, body.velocity[0] - body.angular_velocity[1] * below)
     }
 
-    /// Coefficients of the coming step, of bodies that move like `boxes`.
+    /// Coefficients for the coming step, at the motions of `boxes`.
     pub(super) fn frictions(&mut self, boxes: &[LinkState]) -> &[f64] {
         for (i, body) in boxes.iter().enumerate() {
             let (_, speed) = self.edge(i, body);

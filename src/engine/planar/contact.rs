@@ -1,4 +1,4 @@
-//! Corners on the floor, two in lanes: the law of contact and the linear pieces of it that their states stand for.
+//! Contact points, two in lanes: the bottom corners of the boxes, the law of contact, and its linear pieces, which the contact modes select.
 //!
 //! Per corner, with the cone K = {|x| ≤ μ z}, compliance R, velocity w and target w*:
 //!
@@ -19,12 +19,12 @@ const LEAST_DEPTH: f64 = 1e-5;
 /// Approach speed (cm/s) below which nothing bounces, as in Bullet.
 const LEAST_BOUNCE: f64 = 0.2;
 
-/// States of a corner, the linear pieces of the law. One that slides forward is pushed backward: −[`PUSHED_FORWARD`].
+/// Contact modes, one per linear piece of the law. A corner that slides forward is pushed backward: −[`PUSHED_FORWARD`].
 pub(super) const OPEN: f64 = 0.0;
 pub(super) const STICKS: f64 = 1.0;
 pub(super) const PUSHED_FORWARD: f64 = 2.0;
 
-/// The states of two corners.
+/// The contact modes of two corners.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ContactMode(f64x2);
 
@@ -34,7 +34,7 @@ impl ContactMode {
         Self((sticks & f64x2::ONE) | (slides & f64x2::splat(2.0).copysign(direction)))
     }
 
-    /// The corners of the lanes of the mask `these`; the others are open.
+    /// These modes in the lanes of the mask `these`, open in the others.
     #[inline(always)]
     fn of(self, these: f64x2) -> Self {
         Self(self.0 & these)
@@ -55,7 +55,7 @@ impl ContactMode {
         !self.0.simd_ne(f64x2::ZERO).any()
     }
 
-    /// As numbers for storing, of which none is negative.
+    /// As non-negative numbers for storing.
     pub(super) fn saved(self) -> [f64; 2] {
         self.0.to_array().map(|state| if state == -2.0 { 3.0 } else { state })
     }
@@ -70,7 +70,7 @@ impl ContactMode {
     }
 }
 
-/// Coefficients of friction μ, and what the law needs of them.
+/// Friction cones of two corners: coefficients μ, and what the law needs of them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FrictionCone {
     friction: f64x2,
@@ -91,36 +91,36 @@ impl FrictionCone {
     }
 }
 
-/// The bottom corners of a level's bodies at their reference points or at their other ends.
+/// The bottom corners of a tree level's two bodies, at their reference points or at their far ends.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Corners {
     /// From the bodies' reference points (cm).
     arm: [f64x2; 2],
-    /// The last look at the floor that found one of them near, and the mask of those.
+    /// The last contact-detection pass that found a candidate among them, and the mask of candidates.
     pass: u64,
     near: f64x2,
     mode: ContactMode,
-    /// The states that the newest solution asks for.
+    /// The modes that the newest solution requires.
     required: ContactMode,
     cone: FrictionCone,
-    /// Mean velocity w* that stops them on the floor at the end (cm/s).
+    /// Mean velocity w* that stops them on the floor at the step's end (cm/s).
     target: [f64x2; 2],
     /// Mean velocity of the iterate (cm/s).
     velocity: [f64x2; 2],
     /// Mean velocity of the newest solution, less the iterate's.
     step: [f64x2; 2],
-    /// Impulse of the floor on them (dyn·s), times the weight.
+    /// Impulse of the floor (dyn·s), times the weight.
     impulse: [f64x2; 2],
 }
 
-/// Two contact candidates: where these corners are, and how they move.
+/// Kinematics of two contact candidates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Candidates {
     /// From their bodies' reference points in the middle of the step (cm).
     pub(super) arm: [f64x2; 2],
     /// Above the floor (cm) in the middle of the step, if they go straight on.
     pub(super) gap: f64x2,
-    /// At the start of the step (cm/s), and by how much it turns in half a step.
+    /// Velocity at the start of the step (cm/s), and its change in half a step at constant rates.
     pub(super) velocity: [f64x2; 2],
     pub(super) curve: [f64x2; 2],
 }
@@ -135,15 +135,15 @@ impl Corners {
         Self { cone, ..Self::default() }
     }
 
-    /// Changes the friction.
+    /// Sets the friction.
     pub(super) fn set_cone(&mut self, cone: FrictionCone) {
         self.cone = cone;
     }
 
-    /// Prepares those of the mask `near`: what mean velocity stops them on the floor at the step's end. They go on in the states of the step before, if
-    /// this was near in the `look` before this one.
+    /// Prepares the candidates of the mask `near` in detection pass `pass`: sets the mean velocity that stops them on the floor at the step's end. Modes are kept
+    /// from the pass before.
     ///
-    /// From v to v⁺ at the ends of the step a corner's mean velocity in the pose of the middle is w v⁺ + (1 − w) v + (1 − 2 w) curve.
+    /// With velocity v at the start and v⁺ at the end, the mean velocity in the pose of the middle is w v⁺ + (1 − w) v + (1 − 2 w) curve.
     #[inline(always)]
     pub(super) fn place(&mut self, pass: u64, near: f64x2, candidates: &Candidates, law: &ContactLaw) {
         let Candidates { arm, gap, velocity: before, curve } = *candidates;
@@ -165,13 +165,13 @@ impl Corners {
         (0..2).for_each(|k| self.target[k] = fma(uneven, curve[k], self.target[k]));
     }
 
-    /// Takes stored states up again.
+    /// Restores stored modes.
     pub(super) fn restore(&mut self, mode: ContactMode, pass: u64) {
         (self.mode, self.pass) = (mode, pass);
         self.impulse = [f64x2::ZERO; 2];
     }
 
-    /// Lets corners that reach the floor in this step leave it with the share `restitution` of the speed they come with (cm/s).
+    /// Lets corners that reach the floor in this step leave it with the fraction `restitution` of their approach speed (cm/s).
     #[inline(always)]
     pub(super) fn bounce(&mut self, gap: f64x2, speed: f64x2, restitution: f64, law: &ContactLaw) {
         if restitution <= 0.0 {
@@ -183,29 +183,29 @@ impl Corners {
         self.target[1] = (reach & fast).select(bounced, self.target[1]);
     }
 
-    /// Whether neither touches, of corners near the floor.
+    /// True if both are open.
     #[inline(always)]
     pub(super) fn is_open(&self) -> bool {
         self.mode.is_open()
     }
 
-    /// The mask of those that are open.
+    /// Mask of the open ones.
     #[inline(always)]
     pub(super) fn open(&self) -> f64x2 {
         self.mode.0.simd_eq(f64x2::ZERO)
     }
 
-    /// The states, in the time of a look.
+    /// The modes as of detection pass `pass`.
     pub(super) fn mode(&self, pass: u64) -> ContactMode {
         if self.pass == pass { self.mode } else { ContactMode::default() }
     }
 
-    /// Impulses of the floor on them over the step (dyn·s), in the time of a look.
+    /// Impulses of the floor over the step (dyn·s) as of detection pass `pass`.
     pub(super) fn impulses(&self, pass: u64, law: &ContactLaw) -> [f64x2; 2] {
         if self.pass == pass { self.impulse.map(|part| part / f64x2::splat(law.weight)) } else { [f64x2::ZERO; 2] }
     }
 
-    /// The law: states and impulses at the mean velocities `v`.
+    /// The law: modes and impulses at the mean velocities `v`.
     #[inline(always)]
     fn law(&self, v: [f64x2; 2], law: &ContactLaw) -> (ContactMode, [f64x2; 2]) {
         let stiffness = f64x2::splat(law.stiffness);
@@ -216,7 +216,7 @@ impl Corners {
         let pressed = if coulomb { pull[1] } else { fma(mu, sideways, pull[1]) };
         let touches = pressed.simd_gt(f64x2::ZERO) & self.near;
         if !touches.any() {
-            // So most corners near the floor.
+            // The most frequent case.
             return Default::default();
         }
         let sticks = sideways.simd_le(mu * pull[1]) & touches;
@@ -233,7 +233,7 @@ impl Corners {
         [self.cone.slide[0].copysign(mode.0), self.cone.slide[1]]
     }
 
-    /// a·b through the law's pieces: −dλ/dw = stiffness · (0, all, or the part along the slide).
+    /// aᵀ (−dλ/dw) b on the mode's piece of the law: stiffness times nothing, everything, or the part along the slide.
     #[inline(always)]
     fn product(&self, mode: ContactMode, a: [f64x2; 2], b: [f64x2; 2], law: &ContactLaw) -> f64x2 {
         let d = self.slide(mode);
@@ -298,7 +298,7 @@ impl Corners {
         [fma(-mean[0], self.arm[1], mean[1]), fma(mean[0], self.arm[0], mean[2])]
     }
 
-    /// Whether the bodies' motion `mean` asks for the states that it was solved with; the impulses belong to it then.
+    /// Evaluates the law at the bodies' motion `mean`; true if it requires the modes that `mean` was solved with.
     #[inline(always)]
     pub(super) fn agrees(&mut self, mean: &Spatials, law: &ContactLaw) -> bool {
         (self.required, self.impulse) = self.law(self.velocity_in(mean), law);
@@ -309,8 +309,7 @@ impl Corners {
         !self.required.0.simd_ne(self.mode.0).any()
     }
 
-    /// How far the impulses (dyn·s) of the pieces that the bodies' motion `mean` was solved with, which has just been asked whether it
-    /// [`agrees`](Self::agrees), are from the law's at most.
+    /// Largest difference (dyn·s) between the impulses that `mean` was solved with and the law's. After [`agrees`](Self::agrees) for the same `mean`.
     pub(super) fn mismatch(&self, mean: &Spatials, law: &ContactLaw) -> f64 {
         let v = self.velocity_in(mean);
         let stiffness = f64x2::splat(law.stiffness);
@@ -326,61 +325,61 @@ impl Corners {
         self.impulse.iter().flat_map(|part| part.abs().to_array()).fold(0.0, f64::max)
     }
 
-    /// Mean velocities (cm/s) less what stops the corners on the floor.
+    /// Excess velocity w − w* (cm/s).
     #[inline(always)]
     pub(super) fn excess(&self, mean: &Spatials) -> [f64x2; 2] {
         let v = self.velocity_in(mean);
         [v[0] - self.target[0], v[1] - self.target[1]]
     }
 
-    /// Of the corner in a lane, if it is near the floor: arm (cm) and coefficient of friction.
+    /// Arm (cm) and coefficient of friction of the corner in a lane, if it is a candidate.
     pub(super) fn near(&self, lane: usize) -> Option<([f64; 2], f64)> {
         let is_near = self.near.to_array()[lane].to_bits() != 0;
         is_near.then(|| (self.arm.map(|part| part.to_array()[lane]), self.cone.friction.to_array()[lane]))
     }
 
-    /// The states.
-    pub(super) fn states(&self) -> [f64; 2] {
+    /// The modes.
+    pub(super) fn modes(&self) -> [f64; 2] {
         self.mode.0.to_array()
     }
 
-    /// Which of them the newest solution that was asked for leaves in their states.
+    /// True for the corners whose mode the newest solution keeps.
     pub(super) fn agree(&self) -> [bool; 2] {
-        let (required, states) = (self.required.0.to_array(), self.states());
-        [0, 1].map(|lane| required[lane] == states[lane])
+        let (required, modes) = (self.required.0.to_array(), self.modes());
+        [0, 1].map(|lane| required[lane] == modes[lane])
     }
 
-    /// Puts the corners in these states.
+    /// Sets the modes.
     #[inline(always)]
-    pub(super) fn set_modes(&mut self, states: [f64; 2]) {
-        self.mode = ContactMode(f64x2::new(states));
+    pub(super) fn set_modes(&mut self, modes: [f64; 2]) {
+        self.mode = ContactMode(f64x2::new(modes));
     }
 
-    /// Whether one of them slides.
+    /// True if one of them slides.
     #[inline(always)]
     pub(super) fn slides(&self) -> bool {
         self.mode.slides().any()
     }
 
-    /// Takes the bodies' motion `mean`, which has just been asked whether it [`agrees`](Self::agrees), as iterate.
+    /// Makes `mean` the iterate. After [`agrees`](Self::agrees) for the same `mean`.
     #[inline(always)]
     pub(super) fn accept(&mut self, mean: &Spatials) {
         self.velocity = self.velocity_in(mean);
         self.mode = self.required;
     }
 
-    /// Takes the states that the newest solution asks for, under Coulomb's law. Of corners that slide and are asked to slide the other way the pieces in
-    /// between are so narrow that they are passed over otherwise: such corners stick.
+    /// Takes the modes that the newest solution requires, under Coulomb's law. A corner whose sliding would reverse sticks first: the piece in between is so
+    /// narrow that Newton's method would step over it.
     #[inline(always)]
     pub(super) fn adopt_required_modes(&mut self) {
         let turned = self.required.slides() & self.required.0.simd_eq(-self.mode.0);
         self.mode = ContactMode(turned.select(f64x2::ONE, self.required.0));
     }
 
-    /// Prepares a search from the iterate to `mean`, which has just been asked whether it [`agrees`](Self::agrees).
+    /// Prepares a line search from the iterate to `mean`. After [`agrees`](Self::agrees) for the same `mean`.
     ///
-    /// Of corners that do not: impulse along the way at its end, if the iterate's pieces went so far, and by how much it fell. The others are
-    /// on the same pieces at both ends, and therefore between, for these are convex.
+    /// For corners whose mode changes: the impulse along the search direction at its end on the iterate's pieces, and by how much it fell. The others are
+    /// on the same pieces at both ends, and therefore in between, for the pieces are convex.
     #[inline(always)]
     pub(super) fn aim(&mut self, mean: &Spatials, law: &ContactLaw) -> Option<[f64; 2]> {
         let to = self.velocity_in(mean);
@@ -392,21 +391,21 @@ impl Corners {
         Some([left, self.step].map(|of| self.product(self.mode, of, self.step, law).reduce_add()))
     }
 
-    /// The iterate's velocity at the share `t` of the search.
+    /// Velocity at the fraction `t` of the line search (cm/s).
     #[inline(always)]
     fn velocity_at(&self, t: f64) -> [f64x2; 2] {
         let t = f64x2::splat(t);
         [fma(t, self.step[0], self.velocity[0]), fma(t, self.step[1], self.velocity[1])]
     }
 
-    /// impulse·step and its slope at the share `t` of the search.
+    /// impulse·step and its slope at the fraction `t` of the line search.
     #[inline(always)]
     pub(super) fn search(&self, t: f64, law: &ContactLaw) -> [f64x2; 2] {
         let (mode, impulse) = self.law(self.velocity_at(t), law);
         [dot(impulse, self.step), -self.product(mode, self.step, self.step, law)]
     }
 
-    /// Goes the share `t` of the search.
+    /// Moves the iterate by the fraction `t` of the line search.
     #[inline(always)]
     pub(super) fn go(&mut self, t: f64, law: &ContactLaw) {
         self.velocity = self.velocity_at(t);
@@ -418,10 +417,9 @@ impl Corners {
 mod tests {
     use super::*;
 
-    /// Between two velocities, a search is told of corners that change what takes them out of the iterate's pieces, and of others nothing:
-    /// then these must be linear in between.
+    /// A line search accounts for corners whose mode changes between two velocities. The others must be linear in between.
     #[test]
-    fn corners_that_stay_on_their_pieces_are_linear_on_the_way() {
+    fn corners_that_keep_their_mode_are_linear_along_a_search() {
         let law = ContactLaw::new(1e-4, 0.5, 1.0, FrictionModel::Convex);
         let near = f64x2::ZERO.simd_eq(f64x2::ZERO);
         let start = Corners { near, ..Corners::new(FrictionCone::new(f64x2::splat(0.5))) };

@@ -1,4 +1,4 @@
-//! All corners of the robot over the floor: which may touch during a step, and what they do to their bodies.
+//! All corners of the robot over the floor: contact detection, and contact terms of the bodies.
 
 use std::ops::Range;
 
@@ -12,39 +12,39 @@ use super::recursion::ContactTerms;
 use crate::engine::LARGEST_FRICTION;
 use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
 
-/// The corners of all bodies. Those that may touch in the step at hand are listed.
+/// The corners of all bodies, and the contact candidates of the current step.
 #[derive(Debug, Default)]
 pub(super) struct Floor {
-    /// Two places per level: at the reference points, then at the other ends.
+    /// Two places per tree level: at the reference points, then at the far ends.
     corners: Vec<Corners>,
-    /// Of each level.
+    /// Of each tree level.
     cones: Vec<FrictionCone>,
     surface: Option<Surface>,
     half_thickness: f64,
-    /// Places, in their order.
+    /// Places with contact candidates, in increasing order.
     near: Vec<usize>,
-    /// Those of them that change their states on the way of a search.
+    /// Those of them whose modes change in a line search.
     changing: Vec<usize>,
-    /// How many times corners were looked for.
+    /// Number of contact-detection passes so far.
     detection_pass: u64,
     /// See [`first_landing`](Self::first_landing).
     landing: f64,
-    /// Impulses (dyn·s) of the parts of a step that was cut, of all corners; otherwise empty.
+    /// Sums over the parts of a step that was cut of all corners' impulses (dyn·s); empty for other steps.
     of_parts: Vec<[f64x2; 2]>,
 }
 
-/// Height of both reference points of a level above the floor, with half a thickness (cm), their velocity (cm/s), the bodies' rates (rad/s), and
-/// the mask of the bodies that there are.
+/// Kinematics of a tree level's reference points: height above the floor with half a thickness (cm), velocity (cm/s), rates of the bodies (rad/s).
 struct Reference {
     gap: f64x2,
     velocity: [f64x2; 2],
-    /// At these rates (cm/s²).
+    /// At constant rates (cm/s²).
     acceleration: [f64x2; 2],
     rate: f64x2,
+    /// Mask of the lanes that are not padding.
     there: f64x2,
 }
 
-/// A floor that returns some of an impact, or whose friction depends on speed.
+/// A floor with restitution, or whose friction depends on speed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surface {
     restitution: f64,
@@ -52,13 +52,13 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// None for a plain floor.
+    /// `None` for a plain floor.
     pub(super) fn new(extensions: &Extensions) -> Option<Self> {
         let Extensions { restitution, stick_slip, .. } = *extensions;
         (restitution != 0.0 || stick_slip != StickSlip::OFF).then_some(Self { restitution, stick_slip })
     }
 
-    /// Friction at the sliding speeds that the step begins with.
+    /// Friction at the sliding speeds of the step's start (cm/s).
     fn cone(&self, plain: FrictionCone, speed: f64x2) -> FrictionCone {
         let [a, b] = plain.friction();
         let [u, v] = speed.to_array();
@@ -68,7 +68,7 @@ impl Surface {
 }
 
 impl Floor {
-    /// Corners with the coefficients of friction of both bodies of each level, under boxes of twice `half_thickness` (cm).
+    /// A floor under boxes of twice `half_thickness` (cm), with the coefficients of friction of both bodies of each tree level.
     pub(super) fn new(frictions: &[[f64; 2]], half_thickness: f64, surface: Option<Surface>) -> Self {
         let cones: Vec<FrictionCone> = frictions.iter().map(|pair| FrictionCone::new(f64x2::new(*pair))).collect();
         let corners: Vec<Corners> = cones.iter().flat_map(|cone| [Corners::new(*cone); 2]).collect();
@@ -86,8 +86,8 @@ impl Floor {
         }
     }
 
-    /// Looks which corners may touch, with the root's reference point at `height` (cm) over the ground that the centre line rests on and with this velocity
-    /// (cm/s) and acceleration at constant rates (cm/s²). Lanes without mass have no corners.
+    /// The contact-detection pass. The root's reference point is at `height` (cm) over the floor as the centre line sees it, with the velocity (cm/s) and
+    /// acceleration at constant rates (cm/s²) in `root`.
     #[inline(always)]
     pub(super) fn find(&mut self, quads: &[Quad], levels: usize, height: f64, root: [[f64; 2]; 2], law: &ContactLaw) {
         self.near.clear();
@@ -98,20 +98,19 @@ impl Floor {
         let half = f64x2::splat(self.half_thickness);
         let mut at = f64x2::splat(height + self.half_thickness);
         let [mut moving, mut bending] = root.map(|part| part.map(f64x2::splat));
-        // Levels that the accelerations have been carried along: as far as corners are near, which seldom is to the tips.
+        // Accelerations are needed at candidates only, so they are carried along no further than these.
         let mut carried = 0;
         for k in 0..levels {
             let quad = &quads[k / 2];
             let (along, across) = (pair(&quad.along, k % 2), pair(&quad.across, k % 2));
             let rate = quad.motion[0].level(k % 2);
-            // The side of the box that looks down: its corners are as much aside and below the centre line as the box turns.
+            // The corners of the box's lower side, from the centre line.
             let down = half.copysign(along[0]);
             let (x, z) = (down * along[1], -down * along[0]);
             let (outer_x, outer_z) = (across[0] + x, across[1] + z);
             let near = |x: f64x2, z: f64x2| (at + z).simd_lt(fma(-step, fma(rate, x, moving[1]), reach));
             let (inner, outer) = (near(x, z), near(outer_x, outer_z));
             if (inner | outer).any() {
-                // Most levels are not: what only these need is made here.
                 for level in carried..k {
                     let (across, rate) = (pair(&quads[level / 2].across, level % 2), quads[level / 2].motion[0].level(level % 2));
                     bending = [0, 1].map(|axis| next(bending[axis], -rate * (rate * across[axis]), level));
@@ -132,8 +131,8 @@ impl Floor {
         }
     }
 
-    /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor. The links point `along`, and the root's
-    /// reference point has this height (cm, as in [`find`](Self::find)) and velocity (cm/s).
+    /// Time (s) until the first of the corners that come down faster than `least` (cm/s) lands, at constant velocities. The links point `along`, and the root's
+    /// reference point has this height (cm, as in [`find`](Self::find)) and vertical velocity (cm/s).
     #[inline(always)]
     pub(super) fn landing(
         &self,
@@ -167,7 +166,7 @@ impl Floor {
         a.min(b)
     }
 
-    /// Lists the corners of a place, at `arm` from its bodies' reference points, and prepares those of the mask `near` that have a body.
+    /// Makes the corners of a place, at `arm` (cm) from their bodies' reference points, candidates where the mask `near` says so.
     #[inline(always)]
     fn place(&mut self, place: usize, near: f64x2, arm: [f64x2; 2], from: &Reference, law: &ContactLaw) {
         let near = near & from.there;
@@ -186,32 +185,32 @@ impl Floor {
         self.near.push(place);
         let comes = near & self.corners[place].open() & law.cuts(gap, velocity[1]);
         if comes.any() {
-            // The gap is that of the step's middle.
+            // The gap is that in the step's middle.
             let time = gap / -velocity[1] + f64x2::splat(0.5 * law.reach().0);
             let time = comes.select(time.fast_max(f64x2::ZERO), f64x2::splat(f64::INFINITY));
             self.landing = time.to_array().into_iter().fold(self.landing, f64::min);
         }
     }
 
-    /// When the first corner lands in the step that corners were just looked for (s from its start), of those that cut it; infinite where none does.
+    /// Time from the step's start until the first landing that cuts it (s); infinite if none does.
     #[inline(always)]
     pub(super) fn first_landing(&self) -> f64 {
         self.landing
     }
 
-    /// Begins a step that is cut.
+    /// Begins to sum the impulses of a step that is cut.
     pub(super) fn begin_parts(&mut self) {
         self.of_parts.clear();
         self.of_parts.resize(self.corners.len(), [f64x2::ZERO; 2]);
     }
 
-    /// Begins a step that is not.
+    /// Begins a step that is not cut.
     #[inline(always)]
     pub(super) fn begin_whole(&mut self) {
         self.of_parts.clear();
     }
 
-    /// Adds the impulses of a part of the step.
+    /// Adds the impulses of a part of a step.
     pub(super) fn end_part(&mut self, law: &ContactLaw) {
         for (sum, corners) in self.of_parts.iter_mut().zip(&self.corners) {
             let impulses = corners.impulses(self.detection_pass, law);
@@ -219,7 +218,7 @@ impl Floor {
         }
     }
 
-    /// Prepares corners for a floor that is not plain.
+    /// Applies restitution and speed-dependent friction to candidates.
     #[inline(never)]
     fn apply_surface(&mut self, place: usize, gap: f64x2, velocity: [f64x2; 2], law: &ContactLaw) {
         let Some(surface) = &self.surface else { return };
@@ -228,7 +227,7 @@ impl Floor {
         corners.bounce(gap, velocity[1], surface.restitution, law);
     }
 
-    /// Force per sliding speed and link on the floor (dyn·s/cm).
+    /// Viscous friction per link on the floor (dyn·s/cm).
     fn viscous(&self) -> f64 {
         self.surface.map_or(0.0, |surface| surface.stick_slip.viscous)
     }
@@ -238,8 +237,7 @@ impl Floor {
     }
 
     /// Adds viscous friction over the time `share` (s) to the momentum of the bodies on the floor, with the root's reference point as in
-    /// [`find`](Self::find). A force of its own and not a part of the coefficient: which corner bears the weight of a flat robot changes
-    /// from step to step, and with it what a coefficient would have to be.
+    /// [`find`](Self::find). It is a force per body and no part of μ, for which corner bears a flat robot's weight changes from step to step.
     pub(super) fn push_viscous(&self, quads: &mut [Quad], height: f64, share: f64) {
         let push = f64x2::splat(-share * self.viscous());
         let half = f64x2::splat(self.half_thickness);
@@ -247,7 +245,7 @@ impl Floor {
         for k in 0..2 * quads.len() {
             let (quad, level) = (&mut quads[k / 2], k % 2);
             let across = quad.across[1].level(level);
-            // The lowest edge, from the reference point.
+            // Height of the lowest edge, from the reference point.
             let edge = across.fast_min(f64x2::ZERO) - half * quad.along[0].level(level).abs();
             let speed = quad.motion[1].level(level) - quad.motion[0].level(level) * (edge - quad.middle.level(level) * across);
             let near = (at + edge).simd_lt(f64x2::splat(VISCOUS_REACH)) & quad.mass.level(level).simd_gt(f64x2::ZERO);
@@ -259,47 +257,47 @@ impl Floor {
         }
     }
 
-    /// Where all near corners are listed.
+    /// Indices of all candidates.
     pub(super) fn all(&self) -> Range<usize> {
         0..self.near.len()
     }
 
-    /// Where those of `levels` are.
+    /// Indices of the candidates of `levels`.
     pub(super) fn among(&self, levels: &Range<usize>) -> Range<usize> {
         let [start, end] = [levels.start, levels.end].map(|level| self.near.partition_point(|place| *place < 2 * level));
         start..end
     }
 
-    /// Whether a listed corner slides.
+    /// True if a candidate slides.
     #[inline(always)]
     pub(super) fn slides(&self) -> bool {
         self.near.iter().any(|place| self.corners[*place].slides())
     }
 
-    /// The places of all listed corners and the corners.
+    /// All candidates with their places.
     pub(super) fn listed(&self) -> impl Iterator<Item = (usize, &Corners)> {
         self.near.iter().map(|place| (*place, &self.corners[*place]))
     }
 
-    /// Mean velocities (cm/s) of the corners of a place less what stops them on the floor.
+    /// Excess velocities (cm/s) of the corners of a place.
     #[inline(always)]
     pub(super) fn excess(&self, place: usize, quads: &[Quad]) -> [f64x2; 2] {
         self.corners[place].excess(&mean_at(place, quads))
     }
 
-    /// Puts the corners of a place in these states.
+    /// Sets the modes of the corners of a place.
     #[inline(always)]
-    pub(super) fn set_modes(&mut self, place: usize, states: [f64; 2]) {
-        self.corners[place].set_modes(states);
+    pub(super) fn set_modes(&mut self, place: usize, modes: [f64; 2]) {
+        self.corners[place].set_modes(modes);
     }
 
-    /// Listed corners, for the walk to the root.
+    /// Candidates, for the tip-to-base pass.
     #[inline(always)]
     pub(super) fn tip_to_base<'a>(&'a self, among: &Range<usize>, law: &'a ContactLaw) -> TipToBase<'a> {
         TipToBase { corners: &self.corners, near: &self.near[among.clone()], law }
     }
 
-    /// Calls `each` with the levels of listed corners, with these and the mean motions of their bodies.
+    /// Calls `each` with tree level, corners and the bodies' mean motions of the candidates `among`.
     #[inline(always)]
     pub(super) fn near(&mut self, among: &Range<usize>, quads: &[Quad], mut each: impl FnMut(usize, &mut Corners, &Spatials)) {
         for &place in &self.near[among.clone()] {
@@ -307,7 +305,7 @@ impl Floor {
         }
     }
 
-    /// Prepares listed corners for a search: sums of what [`Corners::aim`] tells of those that change.
+    /// Prepares a line search; returns the sums of [`Corners::aim`].
     #[inline(always)]
     pub(super) fn aim(&mut self, among: &Range<usize>, quads: &[Quad], law: &ContactLaw) -> [f64; 2] {
         self.changing.clear();
@@ -321,7 +319,7 @@ impl Floor {
         sums
     }
 
-    /// Impulse along the way and its slope at the share `t` of a search, summed over the corners that change, one after the other.
+    /// Impulse along the search direction and its slope at the fraction `t` of a line search, summed over the corners whose mode changes.
     #[inline(always)]
     pub(super) fn search(&self, t: f64, law: &ContactLaw) -> [f64; 2] {
         self.changing.iter().fold([0.0; 2], |sum, &place| {
@@ -330,7 +328,7 @@ impl Floor {
         })
     }
 
-    /// Impulses on the corners of one body over the step (dyn·s): at its reference point and at its other end.
+    /// Impulses on the corners of one body over the step (dyn·s): at its reference point and at its far end.
     pub(super) fn impulses_on(&self, level: usize, lane: usize, law: &ContactLaw) -> [[f64; 2]; 2] {
         [2 * level, 2 * level + 1].map(|place| {
             let of_parts = self.of_parts.get(place).copied();
@@ -338,12 +336,12 @@ impl Floor {
         })
     }
 
-    /// Of the bodies' boxes (cm).
+    /// Half the thickness of the boxes (cm).
     pub(super) fn half_thickness(&self) -> f64 {
         self.half_thickness
     }
 
-    /// Sets friction to zero, or back to what it is.
+    /// Exchanges the friction of all corners with `other`.
     pub(super) fn swap_cones(&mut self, other: &mut Vec<FrictionCone>) {
         std::mem::swap(&mut self.cones, other);
         for (place, corners) in self.corners.iter_mut().enumerate() {
@@ -351,18 +349,18 @@ impl Floor {
         }
     }
 
-    /// Forgets all contact.
+    /// Clears candidates and modes.
     pub(super) fn clear(&mut self) {
         self.near.clear();
         self.detection_pass += 1;
     }
 
-    /// The states of all corners as numbers for storing: four per level, at the reference points and at the other ends.
+    /// The modes of all corners as numbers for storing: four per tree level, at the reference points and at the far ends.
     pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
         self.corners.iter().flat_map(|corners| corners.mode(self.detection_pass).saved())
     }
 
-    /// Takes the states up again.
+    /// Restores stored modes.
     pub(super) fn restore(&mut self, saved: &[f64]) {
         for (corners, saved) in self.corners.iter_mut().zip(saved.as_chunks().0) {
             corners.restore(ContactMode::restored(*saved), self.detection_pass);
@@ -370,7 +368,7 @@ impl Floor {
     }
 }
 
-/// The corners that may touch, to be taken from the tips to the root.
+/// Candidates in the order of the tip-to-base pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TipToBase<'a> {
     corners: &'a [Corners],
@@ -379,13 +377,12 @@ pub(super) struct TipToBase<'a> {
 }
 
 impl ContactTerms for TipToBase<'_> {
-    /// Takes those of `level` off the end and returns what they add to the inertia and force of its bodies; none if all are open.
     #[inline(always)]
     fn take(&mut self, level: usize) -> Option<Arms> {
         if self.near.last().is_none_or(|place| place / 2 != level) {
             return None;
         }
-        let (mut bodies, mut touch) = (Arms::default(), false);
+        let (mut bodies, mut touches) = (Arms::default(), false);
         while let [rest @ .., place] = self.near
             && place / 2 == level
         {
@@ -393,20 +390,20 @@ impl ContactTerms for TipToBase<'_> {
             let corners = &self.corners[*place];
             if !corners.is_open() {
                 corners.add_to(&mut bodies, self.law);
-                touch = true;
+                touches = true;
             }
         }
-        touch.then_some(bodies)
+        touches.then_some(bodies)
     }
 }
 
-/// Mean motion of the bodies of a place.
+/// Mean motion of a place's bodies.
 #[inline(always)]
 fn mean_at(place: usize, quads: &[Quad]) -> Spatials {
     pair(&quads[place / 4].mean, place / 2 % 2)
 }
 
-/// From a level's reference points to the next one's: along each arm; from the root, lane 0 stays and lane 1 goes to the root's other end.
+/// From a tree level's reference points to the next one's. From the root, lane 0 stays and lane 1 goes to the root's far end.
 #[inline(always)]
 pub(super) fn next(at: f64x2, across: f64x2, level: usize) -> f64x2 {
     if level > 0 {

@@ -25,7 +25,10 @@ impl Engine for PlanarEngine {
 
     /// Positions and velocities of the same time, unlike the reference's.
     fn nodes(&mut self, positions: &mut [f64], velocities: &mut [f64]) -> Result<(), EngineError> {
-        self.posed(|engine| {
+        for (what, given) in [("the nodes' positions", positions.len()), ("the nodes' velocities", velocities.len())] {
+            EngineError::unless_length(what, given, 3 * (self.count + 1))?;
+        }
+        self.with_present_pose(|engine| {
             let (mut position, mut velocity) = engine.left_end();
             let rows = positions.chunks_exact_mut(3).zip(velocities.chunks_exact_mut(3));
             for (i, (node, node_velocity)) in rows.enumerate() {
@@ -43,6 +46,7 @@ impl Engine for PlanarEngine {
     }
 
     fn places(&mut self, nodes: &mut [[f64; 2]]) -> Result<(), EngineError> {
+        EngineError::unless_length("the nodes' places", nodes.len(), self.count + 1)?;
         dispatch!(self.level, simd => self.places_here(simd, nodes));
         Ok(())
     }
@@ -56,7 +60,7 @@ impl Engine for PlanarEngine {
     }
 
     fn base(&mut self) -> Result<PlanarBase, EngineError> {
-        Ok(self.posed(|engine| {
+        Ok(self.with_present_pose(|engine| {
             let (position, velocity) = engine.left_end();
             let [x, z] = engine.body_vector(0).map(|part| 0.5 * part);
             let rate = engine.of_body(0, |quad| quad.motion[0]);
@@ -71,7 +75,7 @@ impl Engine for PlanarEngine {
 
     fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
         contacts.clear();
-        self.posed(|engine| {
+        self.with_present_pose(|engine| {
             if engine.mount != Mount::Ground {
                 return;
             }
@@ -119,6 +123,7 @@ impl Engine for PlanarEngine {
     }
 
     fn set_time_step(&mut self, time_step: f64, ahead: Option<f64>) -> Result<(), EngineError> {
+        EngineError::unless_step(time_step)?;
         self.set_length(time_step, ahead.map_or_else(|| landing::ahead(time_step), Ahead::all));
         self.law.at_once = time_step;
         self.law.landing_speed = if ahead.is_none() { self.landing_speed() } else { f64::INFINITY };

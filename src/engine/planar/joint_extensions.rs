@@ -1,10 +1,10 @@
-//! What joints and bodies do beyond eq. 1: softening, dry friction, the loss ladder, and drag in air.
+//! Joint torques beyond eq. 1 (softening, dry friction, a generalised Maxwell or Prony chain), and drag in air.
 //!
 //! The step stays one problem that is linear in the mean rates u: a joint's extra torque e is put as e* − s (u − u*), about the rate u* of the
 //! step before. For softening s is the tangent, which errs by the square of what changes in a step. For dry friction, τ_c tanh(u/ω), the step
 //! is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
-//! with the secant −e*/u*, for the quadratic that it stands for lies above the friction's potential and touches it, so that a repetition can
-//! only lower the whole (majorisation). The loss ladder is linear and exact over a step.
+//! with the secant −e*/u*, whose quadratic potential majorises that of friction, so that a repetition can only lower the cost. The Prony chain is linear and
+//! exact over a step.
 
 use wide::f64x2;
 
@@ -13,21 +13,21 @@ use super::quad::Quad;
 use crate::engine::GAUSS;
 use crate::model::{AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
 
-/// Repetitions end when no torque of friction changes by more than this share of its moment, or fail after so many.
+/// Repetitions end when no friction torque changes by more than this fraction of its moment; after `LARGEST_REPETITIONS` they fail.
 const FRICTION_ENOUGH: f64 = 1e-3;
 /// A joint slides fast at this multiple of the rate at which friction has 76 % of its moment.
 const FAST: f64 = 3.0;
 pub(super) const LARGEST_REPETITIONS: u32 = 200;
 
-/// One robot's extra torques, with their memory.
+/// Extra torques of one robot, with their memory.
 #[derive(Debug, Clone)]
 pub(super) struct JointExtensions {
     softening: f64,
     friction: f64,
     /// ξ.
     loss: f64,
-    /// Per unit of the loss ladder's memory: what is left after a step, what a rate adds, and the means over the step of both.
-    ladder: [[f64; 4]; LOSS_TIMES.len()],
+    /// Per unit of the Prony chain: remainder after a step, gain per rate, and the means of both over the step.
+    prony: [[f64; 4]; LOSS_TIMES.len()],
     half_step: f64,
     /// ½ ρ C_d w (g/cm²).
     drag: f64,
@@ -39,14 +39,14 @@ pub(super) struct JointExtensions {
     joint: Vec<Lanes>,
     /// Mean rates of the joints in the last step (rad/s).
     rates: Vec<Lanes>,
-    /// Whether a joint has turned back in this step's repetitions.
+    /// True for joints whose rate changed sign in this step's repetitions.
     turned_back: Vec<[bool; 4]>,
-    /// q_j of the loss ladder (rad).
+    /// q_j of the Prony chain (rad).
     memory: Vec<[Lanes; LOSS_TIMES.len()]>,
 }
 
 impl JointExtensions {
-    /// None if the robot has nothing of it.
+    /// `None` for the plain model.
     pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Self> {
         if !extensions.bends_torque_law() && extensions.drag == 0.0 {
             return None;
@@ -61,7 +61,7 @@ impl JointExtensions {
             softening: extensions.softening / (link * link),
             friction: extensions.dry_friction,
             loss: extensions.loss,
-            ladder: ladder(step),
+            prony: prony(step),
             half_step: 0.5 * step,
             drag: 0.5 * AIR_DENSITY * extensions.drag * width,
             implicit: quads.iter().map(|quad| quad.implicit).collect(),
@@ -76,7 +76,7 @@ impl JointExtensions {
     pub(super) fn set_time_step(&mut self, step: f64, quads: &[Quad]) {
         self.half_step = 0.5 * step;
         if self.loss != 0.0 {
-            self.ladder = ladder(step);
+            self.prony = prony(step);
         }
         self.implicit.iter_mut().zip(quads).for_each(|(implicit, quad)| *implicit = quad.implicit);
     }
@@ -94,19 +94,19 @@ impl JointExtensions {
         (stiffness * torque, stiffness * slope)
     }
 
-    /// Extra torques of a joint at rest, for statics, seen from the root.
+    /// Extra torques (dyn·cm) of joints at rest, for statics, in the sense of rotation from the root outwards.
     pub(super) fn at_rest(&self, k: usize, quad: &Quad, delta: Lanes) -> Lanes {
         if self.softening == 0.0 { Lanes::ZERO } else { self.softened(self.joint[k] * quad.stiffness, delta).0 }
     }
 
-    /// Extra torques at elastic angle and rate, seen from the root: what is recorded.
+    /// Extra torques (dyn·cm) at elastic angle (rad) and rate (rad/s), for records, in the same sense.
     pub(super) fn now(&self, k: usize, quad: &Quad, delta: Lanes, rate: Lanes) -> Lanes {
         let friction = rate.map(|rate| self.friction * (rate / DRY_FRICTION_RATE).tanh());
         let stored = self.memory[k].iter().fold(Lanes::ZERO, |sum, q| sum + *q);
         self.at_rest(k, quad, delta) - self.joint[k] * friction - quad.stiffness * Lanes::splat(self.loss) * stored
     }
 
-    /// Begins a step: keeps the plain torques that the bodies carry.
+    /// Begins a step: stores the plain model's torques.
     pub(super) fn begin(&mut self, quads: &[Quad]) {
         for (torque, quad) in self.torque.iter_mut().zip(quads) {
             *torque = quad.torque;
@@ -127,7 +127,7 @@ impl JointExtensions {
         }
     }
 
-    /// Puts the extra torques, linear about the last rates, into the joints: `share` (s) of them.
+    /// Adds the extra torques, linearised about the last rates, to the joints: their impulses over `share` (s).
     pub(super) fn load(&self, quads: &mut [Quad], share: f64) {
         let share = Lanes::splat(share);
         let half = Lanes::splat(self.half_step);
@@ -149,7 +149,7 @@ impl JointExtensions {
             }
             if self.loss != 0.0 {
                 let stiffness = stiffness * Lanes::splat(self.loss);
-                for ([_, _, kept, added], q) in self.ladder.iter().zip(&self.memory[k]) {
+                for ([_, _, kept, added], q) in self.prony.iter().zip(&self.memory[k]) {
                     torque += -(stiffness * Lanes::splat(*kept) * *q);
                     slope += stiffness * Lanes::splat(*added);
                 }
@@ -160,7 +160,7 @@ impl JointExtensions {
         }
     }
 
-    /// Takes the joints' mean rates of a solution; whether friction is as it was put.
+    /// Takes the joints' mean rates of a solution; true if the linearised friction agrees with the law there.
     pub(super) fn accept(&mut self, quads: &[Quad]) -> bool {
         let mut before = f64x2::ZERO;
         let mut changed = 0.0_f64;
@@ -170,7 +170,6 @@ impl JointExtensions {
             if self.friction != 0.0 {
                 for lane in 0..4 {
                     let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
-                    // What was put, against what it should have been.
                     let (slope, rest) = self.friction(before, self.turned_back[k][lane]);
                     let put = slope * now - rest;
                     changed = changed.max((put / self.friction - (now / DRY_FRICTION_RATE).tanh()).abs());
@@ -182,13 +181,13 @@ impl JointExtensions {
         changed <= FRICTION_ENOUGH
     }
 
-    /// Ends a step: the ladder remembers.
+    /// Ends a step: advances the Prony chain.
     pub(super) fn end(&mut self) {
         if self.loss == 0.0 {
             return;
         }
         for (memory, rate) in self.memory.iter_mut().zip(&self.rates) {
-            for (q, [left, added, ..]) in memory.iter_mut().zip(&self.ladder) {
+            for (q, [left, added, ..]) in memory.iter_mut().zip(&self.prony) {
                 *q = Lanes::splat(*left) * *q + Lanes::splat(*added) * *rate;
             }
         }
@@ -228,8 +227,8 @@ impl JointExtensions {
     }
 }
 
-/// What is left of each unit of the loss ladder's memory after a `step` (s), what a rate adds, and the means over the step of both.
-fn ladder(step: f64) -> [[f64; 4]; LOSS_TIMES.len()] {
+/// Per unit of the Prony chain: remainder after a `step` (s), gain per rate (s), and the means of both over the step.
+fn prony(step: f64) -> [[f64; 4]; LOSS_TIMES.len()] {
     LOSS_TIMES.map(|time| {
         let gone = -(-step / time).exp_m1();
         let mean = gone * time / step;

@@ -6,7 +6,7 @@ use super::lanes::Lanes;
 use super::{EngineError, LARGEST_COORDINATE, PlanarEngine};
 
 impl PlanarEngine {
-    /// Sets the joints' voltages and rest angles, if the actuators' `voltages` are not those of the step before.
+    /// Sets the joints' voltages and rest angles, if the actuators' `voltages` (V) have changed.
     pub(super) fn apply(&mut self, voltages: &[f64]) {
         let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
         if self.voltages.len() == voltages.len() && self.voltages.iter().zip(voltages).all(same) {
@@ -26,7 +26,7 @@ impl PlanarEngine {
             let (quad, level) = (&mut self.quads[k / 2], k % 2);
             let (left, right) = joints_of(k, self.root);
             let volts = |joint: Option<usize>| joint.and_then(|i| state.motor_voltages.get(i)).copied().unwrap_or(0.0);
-            // Seen from the root, joint angles are themselves on the left arm and their negatives on the right.
+            // In the sense of rotation from the root outwards, joint angles have their own sign on the left arm and the opposite one on the right.
             let volts = f64x2::new([volts(left), -volts(Some(right))]);
             let mut rest_angle = f64x2::splat(self.joint.rest_angle_per_volt) * volts;
             if !self.rest_angles.is_empty() {
@@ -48,8 +48,8 @@ impl PlanarEngine {
             let rate = quad.motion[0] - quad.motion[0].inner(before[1]);
             before = [quad.angle.level(1), quad.motion[0].level(1)];
             let mut torque = quad.stiffness * (angle - quad.rest_angle + lag * rate);
-            if let Some(beyond) = &self.extensions {
-                torque += -beyond.now(k, quad, angle - quad.rest_angle, rate);
+            if let Some(extensions) = &self.extensions {
+                torque += -extensions.now(k, quad, angle - quad.rest_angle, rate);
             }
             // The root, in the first two lanes, has no joint.
             for lane in if k == 0 { 2..4 } else { 0..4 } {
@@ -63,7 +63,7 @@ impl PlanarEngine {
         }
     }
 
-    /// Fails if a coordinate is no number, or so large that no recording takes it.
+    /// Fails if a coordinate is not finite or exceeds `LARGEST_COORDINATE`.
     pub(super) fn check_finite(&mut self) -> Result<(), EngineError> {
         self.read_joints();
         let sound = |value: f64| value.abs() <= LARGEST_COORDINATE;
@@ -83,8 +83,7 @@ impl PlanarEngine {
     }
 }
 
-/// The joints at the reference points of level `k` of a chain with this root. That of the left arm's body is on its right, that of the right
-/// arm's, which may have ended, on its left.
+/// The joints at the reference points of tree level `k`: on the right of the left arm's body, and on the left of the right arm's body, which may be padding.
 fn joints_of(k: usize, root: usize) -> (Option<usize>, usize) {
     (root.checked_sub(k), root + k - 1)
 }

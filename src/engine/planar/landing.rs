@@ -1,13 +1,12 @@
 //! Corners that land, and steps that are cut there.
 //!
-//! A step that a corner lands in would stop it by its end with what is left of the gap as look-ahead, and the next step would stop the rest: two stages
-//! of an impact, in shares that depend on where in the step it falls. Where other corners touch, plastic impacts with friction in one stage and in two
-//! have different results, so that finer steps would lead nowhere. Therefore a step ends a little before the first landing, and a part of the step
-//! of which the landing is the middle takes the impact at once (Moreau's law): the midpoint rule moves the corner by the mean of its velocities before
-//! and after, to the floor and not further. Corners that would land in what is left of the step are stopped with it, but for what takes them to the floor
-//! within a step: so those that land at once, as by symmetry, do, whatever rounding makes of them. Then the step goes on.
+//! An uncut step would stop a landing corner in two stages, by its own end and in the next step, in proportions that depend on when in the step it lands. Where
+//! other corners touch, plastic impacts with friction in one stage and in two have different results, so that finer steps would not converge. Therefore
+//! a step is cut a little before the first landing, and a short part with the landing in its middle takes the whole impact (Moreau's law): the midpoint
+//! rule moves the corner by the mean of its velocities before and after, to the floor and not further. Corners that would land within the rest of the step are
+//! stopped with it, so that simultaneous landings, as of symmetric robots, stay simultaneous in spite of rounding. Then the step goes on.
 //!
-//! Corners that come down slowly are left to the step, and after many landings, as of a body that rocks to rest, all others.
+//! Slow landings do not cut a step. Nor do any after `MOST_IMPACTS` in one step, as of a body that rocks to rest.
 //!
 //! J. J. Moreau, in *Nonsmooth Mechanics and Applications* (1988), on impacts; V. Acary, B. Brogliato, *Numerical Methods for Nonsmooth Dynamical
 //! Systems* (2008), chapter 8, on steps that end at events.
@@ -19,20 +18,20 @@ use super::law::{Ahead, FrictionModel};
 use super::step::{set_implicit, weight_of};
 use super::{EngineError, PlanarEngine};
 
-/// Corners that come down slower than with this acceleration (cm/s²) over a step do not cut it.
+/// Landings slower than this acceleration (cm/s²) times the step do not cut it.
 const LEAST_ACCELERATION: f64 = 1e5;
-/// Shortest and longest half of an impact's part (s). Over a longer one the arc that a corner describes would be seen.
+/// Shortest and longest half of an impact's part (s); in a longer one the curvature of a corner's path would count.
 const SHORTEST_IMPACT: f64 = 1e-10;
 const LONGEST_IMPACT: f64 = 1e-6;
 /// Impacts in one step, after which it is cut no more.
 const MOST_IMPACTS: u32 = 32;
-/// Look-ahead per square of the step (1/s) for corners that come fast: ω² r / (2 v) of a corner of the paper's robots that lands.
+/// Look-ahead of fast corners per square of the step (1/s): ω² r / (2 v) at landings of the paper's robots.
 const ARC: f64 = 100.0;
-/// Share of the longest part for an impact that a step is cut before the landing: the landing is foreseen from velocities and comes a little later or sooner.
+/// A step is cut this fraction of the impact's longest part before the predicted landing, which comes a little earlier or later.
 const BEFORE: f64 = 0.8;
 
-/// The look-ahead of a step of this length (s) that takes no impact. Those that come fast are to be stopped by their impacts only, but must not be below
-/// the floor before: of the step's square, for so their arcs are curved.
+/// Look-ahead of a step of this length (s) without impact. Fast corners are stopped by their impacts only, but must not be below the floor before: the
+/// curvature of their paths makes that an effect of the step's square.
 pub(super) fn ahead(time_step: f64) -> Ahead {
     let fast = ARC * time_step * time_step;
     Ahead { slow: 0.5 * time_step, fast, landing: fast }
@@ -43,12 +42,12 @@ impl PlanarEngine {
     pub(super) fn landing_speed(&self) -> f64 {
         match self.law.friction {
             FrictionModel::Coulomb => LEAST_ACCELERATION * self.time_step,
-            // An impact in a short step would be another than in a long one.
+            // The convex model's impacts depend on the length of the step.
             FrictionModel::Convex => f64::INFINITY,
         }
     }
 
-    /// Makes the coming steps so long (s), as [`ContactLaw::set_time_step`](super::law::ContactLaw::set_time_step).
+    /// Sets the length of the coming steps (s), as [`ContactLaw::set_time_step`](super::law::ContactLaw::set_time_step).
     pub(super) fn set_length(&mut self, time_step: f64, ahead: Ahead) {
         self.weight = weight_of(self.numerical_damping, time_step);
         self.law.set_time_step(time_step, self.weight, ahead);
@@ -57,8 +56,8 @@ impl PlanarEngine {
         }
         self.time_step = time_step;
         set_implicit(&mut self.quads, &self.joint, self.base_joint, self.weight, time_step);
-        if let Some(beyond) = &mut self.extensions {
-            beyond.set_time_step(time_step, &self.quads);
+        if let Some(extensions) = &mut self.extensions {
+            extensions.set_time_step(time_step, &self.quads);
         }
     }
 
@@ -86,12 +85,12 @@ impl PlanarEngine {
                 self.floor.end_part(&self.law);
                 return Ok(());
             }
-            // What may lie on both sides of the landing.
+            // Half the impact's part at most.
             let most = LONGEST_IMPACT.min(left - first).max(SHORTEST_IMPACT);
             let length = if first <= most {
                 impacts += 1;
                 let half = first.max(SHORTEST_IMPACT);
-                // Those that would land in this step too are stopped with it.
+                // Corners that would land later in this step are stopped as well.
                 self.set_length((2.0 * half).min(left), Ahead { slow: half, fast: 0.0, landing: whole });
                 2.0 * half
             } else {
@@ -111,7 +110,7 @@ impl PlanarEngine {
         }
     }
 
-    /// Time (s) in which the first of the corners that come down faster than `least` (cm/s) is on the floor, if all go on as they move now.
+    /// Time (s) until the first of the corners that come down faster than `least` (cm/s) lands, at constant velocities.
     #[inline(always)]
     pub(super) fn landing_here<S: Simd>(&mut self, simd: S, least: f64) -> f64 {
         let zero = Four::splat(simd, 0.0);

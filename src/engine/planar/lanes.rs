@@ -1,8 +1,7 @@
-//! Four bodies in the lanes of one number, and the registers of this machine for them.
+//! One number of four bodies in SIMD lanes, and this machine's registers for it.
 //!
-//! The registers of the machine at hand are chosen when a program runs (`dispatch!`); what is to be computed in them must be inlined there. Products
-//! and sums are rounded once ([`fma`]), so the bits are the same in all registers. Where there is no such instruction (x86-64 from before 2013) they are
-//! calls of the C library.
+//! The width of the registers is chosen at run time (`dispatch!`); code for them must be inlined there. Products and sums are rounded once ([`fma`]), so the
+//! bits are the same at every width. Without such an instruction (x86-64 from before 2013) the C library computes them.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
@@ -10,14 +9,14 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 use fearless_simd::{Simd, prelude::*};
 use wide::f64x2;
 
-/// One number of four bodies: left and right arm's on a level, then the same on the next level outwards.
+/// One number of four bodies: left and right arm at one tree level, then left and right arm at the next level.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[repr(align(32))]
 pub(super) struct Lanes([f64; 4]);
 
-/// The same in a register.
+/// Four lanes in a register.
 pub(super) type Four<S> = fearless_simd::f64x4<S>;
-/// Half of one: a level.
+/// Two lanes in a register: one level.
 pub(super) type Two<S> = fearless_simd::f64x2<S>;
 
 impl Lanes {
@@ -44,7 +43,7 @@ impl Lanes {
         Self(from_fn(|i| of(self.0[i])))
     }
 
-    /// Its numbers where those of `mask` are positive, and those of `other` elsewhere.
+    /// These lanes where `mask` is positive, `other` elsewhere.
     pub(super) fn where_positive(self, mask: Self, other: Self) -> Self {
         Self(std::array::from_fn(|lane| if mask.0[lane] > 0.0 { self.0[lane] } else { other.0[lane] }))
     }
@@ -53,7 +52,7 @@ impl Lanes {
         self.map(f64::abs)
     }
 
-    /// In an order of its own: a register's sum need not have the same on every machine.
+    /// The sum, in an order that does not depend on the machine.
     #[inline(always)]
     pub(super) fn sum(self) -> f64 {
         let [a, b, c, d] = self.0;
@@ -79,26 +78,26 @@ impl Lanes {
         self.0.as_chunks_mut().0[which] = to.to_array();
     }
 
-    /// What it is for the levels one further inwards, with the one `before` all these.
+    /// The values one level closer to the root, where `before` precedes the first level.
     pub(super) fn inner(self, before: f64x2) -> Self {
         let ([a, b], [c, d, ..]) = (before.to_array(), self.0);
         Self([a, b, c, d])
     }
 }
 
-/// The two bodies of one level, of some numbers.
+/// The two bodies of one level, of N numbers.
 #[inline(always)]
 pub(super) fn pair<const N: usize>(of: &[Lanes; N], level: usize) -> [f64x2; N] {
     from_fn(|k| of[k].level(level))
 }
 
-/// The same in registers, of all four bodies.
+/// N numbers of four bodies, in registers.
 #[inline(always)]
 pub(super) fn on<const N: usize, S: Simd>(simd: S, of: &[Lanes; N]) -> [Four<S>; N] {
     from_fn(|k| of[k].on(simd))
 }
 
-/// [`Lanes::inner`], and the last level's, which is before those that follow.
+/// [`Lanes::inner`] in registers, and the last level's values for the next call.
 #[inline(always)]
 pub(super) fn inner<S: Simd>(values: Four<S>, before: Two<S>) -> (Four<S>, Two<S>) {
     let (first, second) = values.split();
@@ -141,7 +140,7 @@ impl AddAssign for Lanes {
     }
 }
 
-/// Numbers whose products and sums can be rounded once.
+/// Lanes with a fused multiply-add.
 pub(super) trait Fused {
     /// self · by + and.
     fn times(self, by: Self, and: Self) -> Self;
@@ -155,7 +154,7 @@ impl<S: Simd> Fused for Four<S> {
 }
 
 impl Fused for f64x2 {
-    /// The compiler makes one instruction of both where there is one.
+    /// Compiles to one instruction where there is one.
     #[inline(always)]
     fn times(self, by: Self, and: Self) -> Self {
         let (a, b, c) = (self.to_array(), by.to_array(), and.to_array());

@@ -15,25 +15,24 @@ pub enum FrictionModel {
     Convex,
 }
 
-/// Softness of contact, as a share of a body's inverse mass, of impacts and of steps of this length (s). Otherwise it is in inverse proportion to the step:
-/// under a force a corner gives way by the same speed whatever the step, 3·10⁻⁸ cm/s under half a body's weight. A robot that lies on many corners would rest on
-/// others at other steps, and on films of high friction strides would differ by 1 %. Ten times stiffer contact changes heights by 10⁻⁴ of them,
-/// three results on such films by 0.3 to 0.4 %.
+/// Compliance of contact in units of a body's inverse mass, for impacts and for steps of `STEP_OF_SOFTNESS` (s); otherwise in inverse proportion to the step,
+/// so that a corner gives way by the same speed at any step: 3·10⁻⁸ cm/s under half a body's weight. It decides on which of many corners a robot rests
+/// (docs/validation.md).
 const SOFTNESS: f64 = 6e-7;
 const STEP_OF_SOFTNESS: f64 = 1e-4;
-/// Steps so short (s) are an instant, of an impact or next to one.
+/// Steps up to this length (s) count as an instant: an impact, or the rest of a step beside one.
 const INSTANT: f64 = 2e-8;
-/// Largest change of a corner's vertical velocity in a step (cm/s) that is looked ahead for: more than the robots fall with.
+/// Largest change of a corner's vertical velocity in a step (cm/s) for which contact candidates are found: more than the robots fall with.
 const LARGEST_CHANGE: f64 = 150.0;
 /// Share of a penetration that is pushed out per step.
 const PUSH_OUT: f64 = 0.1;
-/// Landings slower than this share of the speed from which on they cut steps are left to the step in any case.
+/// Landings slower than this fraction of [`ContactLaw::landing_speed`] never cut a step.
 const SLOW: f64 = 0.01;
-/// The same share per second at most, where steps differ in length.
+/// Largest push-out rate (1/s), where steps differ in length.
 const FASTEST_PUSH_OUT: f64 = 1e3;
 
-/// How long (s) after a step no corner may pass the floor: those that come down slower than [`ContactLaw::landing_speed`], the others, and of these such as are
-/// about to land.
+/// Look-ahead (s): how long after a step no corner may pass the floor. Of corners slower than [`ContactLaw::landing_speed`], of faster ones, and of faster
+/// ones that land within [`ContactLaw::at_once`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ahead {
     pub(super) slow: f64,
@@ -42,43 +41,43 @@ pub(super) struct Ahead {
 }
 
 impl Ahead {
-    /// The same for all.
+    /// One look-ahead for all.
     pub(super) fn all(ahead: f64) -> Self {
         Self { slow: ahead, fast: ahead, landing: ahead }
     }
 }
 
-/// What all corners share.
+/// The law of contact in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ContactLaw {
     time_step: f64,
     /// Steps per second.
     per_step: f64,
-    /// One over the time (s) from the middle of the step until when no corner may pass the floor.
+    /// One over the look-ahead counted from the middle of the step (1/s): of slow corners,
     per_ahead: f64,
-    /// The same of corners that come down faster than [`landing_speed`](Self::landing_speed).
+    /// of fast ones,
     per_ahead_fast: f64,
-    /// The same of those of them that are about to land.
+    /// and of fast ones that are about to land.
     per_ahead_landing: f64,
-    /// Share of a penetration that is pushed out per second.
+    /// Fraction of a penetration that is pushed out per second.
     pub(super) push_out: f64,
-    /// Corners that come down faster (cm/s) cut the step where they land.
+    /// Corners that come down faster (cm/s) cut the step at their landing.
     pub(super) landing_speed: f64,
-    /// Corners whose landing is nearer (s) at an impact are stopped with it: a step.
+    /// Fast corners that land within this time (s) of an impact are stopped with it.
     pub(super) at_once: f64,
-    /// Share of the step's end in the mean motion.
+    /// Weight of the step's end in the mean motion.
     pub(super) weight: f64,
     /// 1/R (g).
     pub(super) stiffness: f64,
     stiffness_of_impacts: f64,
-    /// Whether the step is an impact, or too short for anything else to happen in it.
+    /// True if the step is an instant.
     pub(super) is_instant: bool,
     pub(super) frictionless: bool,
     pub(super) friction: FrictionModel,
 }
 
 impl ContactLaw {
-    /// Step (s), and the gap (cm) that a corner at rest may close in it.
+    /// Step (s), and the largest gap (cm) that a corner at rest may close in it.
     pub(super) fn reach(&self) -> (f64, f64) {
         (self.time_step, LARGEST_CHANGE * self.time_step)
     }
@@ -88,7 +87,7 @@ impl ContactLaw {
         self.per_step
     }
 
-    /// Makes the coming steps `time_step` (s) long, with that weight of their ends.
+    /// Sets the length (s), the end's weight and the look-ahead of the coming steps.
     pub(super) fn set_time_step(&mut self, time_step: f64, weight: f64, ahead: Ahead) {
         (self.time_step, self.per_step, self.weight) = (time_step, 1.0 / time_step, weight);
         let Ahead { slow, fast, landing } = ahead;
@@ -99,15 +98,15 @@ impl ContactLaw {
         self.stiffness = self.stiffness_of_impacts * if self.is_instant { 1.0 } else { time_step / STEP_OF_SOFTNESS };
     }
 
-    /// Open corners with these gaps in the step's middle (cm) and velocities along z (cm/s), if they go on so, that cut the step where they land: those
-    /// that come fast, and of others those that would be below the floor before the look-ahead stops them.
+    /// Mask of open corners, with these gaps in the step's middle (cm) and velocities along z (cm/s), that cut the step at their landing: fast ones, and others
+    /// that would be below the floor before the look-ahead stops them.
     #[inline(always)]
     pub(super) fn cuts(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
         let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
         fast | (velocity.simd_lt(f64x2::splat(-SLOW * self.landing_speed)) & gap.simd_lt(f64x2::ZERO))
     }
 
-    /// One over the look-ahead (1/s) of corners with these gaps (cm) and velocities along z (cm/s).
+    /// One over the look-ahead (1/s) of corners, by gap (cm) and velocity along z (cm/s).
     #[inline(always)]
     pub(super) fn per_ahead(&self, gap: f64x2, velocity: f64x2) -> f64x2 {
         let fast = velocity.simd_lt(f64x2::splat(-self.landing_speed));
@@ -119,7 +118,7 @@ impl ContactLaw {
         fast.select(of_fast, f64x2::splat(self.per_ahead))
     }
 
-    /// Makes contact a hundred times softer.
+    /// Makes contact a hundred times more compliant.
     pub(super) fn soften(&mut self) {
         self.stiffness *= 0.01;
     }
@@ -143,7 +142,7 @@ impl ContactLaw {
         }
     }
 
-    /// A frictionless floor for displacements: no velocity before, everything near.
+    /// A frictionless floor for displacements, as statics needs it.
     pub(super) fn statics(stiffness: f64) -> Self {
         let friction = FrictionModel::Convex;
         Self {

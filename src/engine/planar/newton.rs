@@ -1,4 +1,4 @@
-//! Newton's method over the states of the corners.
+//! Newton's method over the contact modes: each step solves for the present modes, then takes those that the solution requires.
 
 use std::ops::Range;
 
@@ -12,52 +12,50 @@ use super::recursion::{Articulated, BLOCK, solve};
 use super::{EngineError, PlanarEngine};
 use crate::model::Mount;
 
-/// Newton steps after which a contact problem is given up, and more of them per body of the chain. Measured: 33 in a second of the paper's
-/// robots each, 94 when a chain of 961 bodies is set in motion at once; steps in parts go before and are not among them.
+/// Newton steps after which a contact problem is an error: this many, and more per body. The paper's robots need up to 33, a chain of 961 bodies that is set
+/// in motion at once 94; steps in parts are not counted.
 pub(super) const LARGEST_STEPS: u32 = 100;
 pub(super) const MORE_PER_BODY: u32 = 4;
-/// Newton steps that are taken whole before the way is searched for the lowest cost. Measured: within 1 % as many steps in all as with one.
+/// Full Newton steps before the first line search.
 const WHOLE: u32 = 3;
-/// The search ends where the slope of the cost is this share of the one it began with.
+/// A line search ends where the slope of the cost is this fraction of the first one.
 const SEARCH_ENOUGH: f64 = 0.1;
-/// Steps of the search along one Newton step; it ends much earlier.
+/// Most steps of a line search; it ends much earlier.
 const LARGEST_SEARCH: u32 = 60;
-/// In chains of more levels than this, Newton's method first goes through the parts where corners change: so many times, and so many steps in
-/// each. Measured on robots that jump: with parts 31 levels take 5 % longer, 46 as long, 61 an eighth less, 481 half; twice the steps or one
-/// time more, and parts with another block on either side, take as long or longer.
+/// In chains of more tree levels than this, the parts where modes change are solved first (docs/performance.md).
 pub(super) const LONGEST_WHOLE: usize = 40;
+/// Rounds over these parts, and Newton steps in each.
 const ROUNDS: u32 = 3;
 const STEPS_IN_PART: u32 = 30;
-/// A Newton step is the last if the cost falls by less than these shares of m (g h)² and, per body, of the kinetic energy: the first is a
-/// velocity of 10⁻⁶ of what gravity gives in a step, the second what rounding leaves (measured: 3·10⁻²⁰ for 16 bodies and for 961).
+/// A Newton step is the last if the cost falls by less than these fractions of m (g h)² and, per body, of the kinetic energy: a velocity of 10⁻⁶ of what
+/// gravity gives in a step, and rounding (3·10⁻²⁰ for 16 bodies and for 961).
 const DONE_OF_GRAVITY: f64 = 1e-12;
 const DONE_OF_KINETIC: f64 = 1e-18;
 
-/// Under Coulomb's law, which has no cost to lower, Newton's method may go in circles. After so many steps a path is followed instead ([`path`](super::path)).
-/// Measured: in 3 % of the steps of a robot that jumps; with one or three steps before it, runs take longer.
+/// Under Coulomb's law, which has no cost to lower, Newton's method may cycle. After so many steps a path is followed instead ([`path`](super::path)).
 const BEFORE_PATH: u32 = 2;
-/// How often contact is made softer in an impact, or in an instant, that is not solved. Seen: once, in steps of 2·10⁻¹⁰ s.
+/// How often contact is made more compliant in an instant that is not solved.
 const SOFTENINGS: u32 = 2;
-/// Parts of a long chain, which a path does not go through, are left after so many.
+/// Newton steps after which a part of a long chain is left, for no path goes through parts.
 const COULOMB_STEPS_IN_PART: u32 = 8;
-/// Impulses off the law by less than this share of the robot's weight over the step and of the largest impulse are rounding.
+/// A mismatch of impulses below this fraction of the robot's weight over the step, or of the largest impulse, is rounding.
 const MISMATCH: f64 = 1e-7;
-/// And what rounding leaves of velocities, as a share of the largest: 1024 units in the last place.
+/// Rounding of velocities, as a fraction of the largest: 1024 units in the last place.
 const ROUNDING: f64 = 1024.0 * f64::EPSILON;
 
-/// How a search along a Newton step ended.
+/// How a line search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Search {
     /// The cost cannot fall any more.
     Done,
     /// The lowest cost is at the end of the step.
     Whole,
-    /// It is on the way.
+    /// It is in between.
     Part,
 }
 
 impl PlanarEngine {
-    /// Finds the corners that may touch during the step.
+    /// Finds the contact candidates of the step.
     #[inline(always)]
     pub(super) fn find_corners<S: Simd>(&mut self, simd: S, law: &ContactLaw) {
         if self.mount == Mount::Ground {
@@ -66,7 +64,7 @@ impl PlanarEngine {
         }
     }
 
-    /// Solves the step's mean motion, with the corners that were found.
+    /// Solves for the step's mean motion with the candidates found.
     #[inline(always)]
     pub(super) fn solve_on_floor<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> Result<(), EngineError> {
         let iterations = self.newton(simd, law)?;
@@ -76,7 +74,7 @@ impl PlanarEngine {
         Ok(())
     }
 
-    /// Solves for the corners as they are placed; returns how many Newton steps it took.
+    /// Solves the contact problem; returns the number of Newton steps.
     #[inline(always)]
     fn newton<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> Result<u64, EngineError> {
         let mut steps = 0;
@@ -97,16 +95,15 @@ impl PlanarEngine {
             if law.friction == FrictionModel::Convex || !law.is_instant {
                 break;
             }
-            // Impulses so small that rounding hides what they take to give way. In longer steps softer contact would be another robot.
+            // Impulses may be so small that rounding hides the compliance. In longer steps a softer contact would change the result.
             law.soften();
         }
         let time = self.step as f64 * self.time_step;
         Err(EngineError::NotConverged { iterations: largest, step: self.step, time })
     }
 
-    /// Where corners change, a solution changes much near them and little elsewhere, and what keeps one place from its solution must not keep
-    /// all others: a step for the whole chain, then as many as it takes for each part of it where corners change, and so on. Returns the
-    /// steps, and whether they ended in a solution of the whole chain. Out of line, for short chains never come here.
+    /// Mode changes act locally. Solving each cluster of changed blocks on its own, after a step for the whole chain, keeps one hard cluster from holding up
+    /// the rest. Returns the number of steps, and true if the whole chain is solved. Out of line, for short chains never come here.
     #[inline(never)]
     fn newton_in_parts<S: Simd>(&mut self, simd: S, law: &ContactLaw) -> (u64, bool) {
         simd.vectorize(
@@ -143,7 +140,7 @@ impl PlanarEngine {
         (steps, false)
     }
 
-    /// Solves for the states of the corners as they are, and calls `each` with their levels and whether the solution agrees with them.
+    /// Solves for the present modes, evaluates which modes the solution requires, and calls `each` with tree level and whether these are the present ones.
     #[inline(always)]
     pub(super) fn solve_and_update_active_set(
         &mut self,
@@ -152,12 +149,12 @@ impl PlanarEngine {
         law: &ContactLaw,
         mut each: impl FnMut(usize, bool),
     ) -> Articulated {
-        let felt = self.solve_with_modes(levels, among, law);
+        let at_root = self.solve_with_modes(levels, among, law);
         self.floor.near(among, &self.quads, |level, corners, mean| each(level, corners.agrees(mean, law)));
-        felt
+        at_root
     }
 
-    /// Solves for the contact modes as they are.
+    /// Solves for the present contact modes.
     #[inline(always)]
     pub(super) fn solve_with_modes(&mut self, levels: &Range<usize>, among: &Range<usize>, law: &ContactLaw) -> Articulated {
         // Distal articulated inertias that are kept must be of the same kind, symmetric or not.
@@ -170,11 +167,10 @@ impl PlanarEngine {
         }
     }
 
-    /// Newton's method for some levels, the corners `among` all that are theirs; returns the steps, at most `largest`, and whether they ended
-    /// in a solution.
+    /// Newton's method for `levels`, whose candidates are `among`; returns the number of steps, at most `largest`, and true if they ended in a solution.
     ///
-    /// The cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² is convex with piecewise linear gradient. A Newton step solves for the linear pieces of the
-    /// iterate; if the solution lies on the same pieces it is exact, otherwise the cost is lowered along the way there.
+    /// With the convex model the cost ½ uᵀAu − uᵀb + Σ R/2 |λ|² has a piecewise linear gradient. A Newton step solves for the linear pieces of the iterate; if
+    /// the solution lies on the same pieces it is exact, otherwise a line search lowers the cost towards it.
     #[inline(always)]
     fn newton_steps<S: Simd>(
         &mut self,
@@ -186,14 +182,14 @@ impl PlanarEngine {
     ) -> (u64, bool) {
         for step in 1..=largest {
             let mut agrees = true;
-            let felt = self.solve_and_update_active_set(&levels, &among, law, |_, agree| agrees &= agree);
+            let at_root = self.solve_and_update_active_set(&levels, &among, law, |_, agree| agrees &= agree);
             if agrees {
                 return (step.into(), true);
             }
             if law.friction == FrictionModel::Coulomb {
                 if step > BEFORE_PATH && levels.len() == self.levels {
                     let solved = self.is_rounding(&among, law)
-                        || self.follow_path(simd, Start::AtHand, law)
+                        || self.follow_path(simd, Start::Present, law)
                         || self.follow_path(simd, Start::Open, law);
                     return (step.into(), solved);
                 }
@@ -203,7 +199,7 @@ impl PlanarEngine {
                 self.floor.near(&among, &self.quads, |_, corners, _| corners.adopt_required_modes());
                 continue;
             }
-            match if step <= WHOLE { Search::Whole } else { self.search(simd, &levels, &among, &felt, law) } {
+            match if step <= WHOLE { Search::Whole } else { self.search(simd, &levels, &among, &at_root, law) } {
                 Search::Done => return (step.into(), true),
                 Search::Part => {}
                 Search::Whole => self.accept(&levels, &among),
@@ -212,14 +208,14 @@ impl PlanarEngine {
         (largest.into(), false)
     }
 
-    /// Whether the newest solution is in the states that it asks for, but for rounding.
+    /// True if the newest solution has the modes that it requires, but for rounding.
     pub(super) fn is_solved(&mut self, among: &Range<usize>, law: &ContactLaw) -> bool {
         let mut agrees = true;
         self.floor.near(among, &self.quads, |_, corners, mean| agrees &= corners.agrees(mean, law));
         agrees || self.is_rounding(among, law)
     }
 
-    /// Whether the impulses of the newest solution are the law's but for rounding. Contact is stiff: what rounding leaves of velocities is multiplied.
+    /// True if the impulses of the newest solution are the law's but for rounding, which contact stiffness multiplies.
     fn is_rounding(&mut self, among: &Range<usize>, law: &ContactLaw) -> bool {
         let (mut mismatch, mut largest, mut speed) = (0.0_f64, self.mass * self.gravity * self.time_step, 0.0_f64);
         self.floor.near(among, &self.quads, |_, corners, mean| {
@@ -230,7 +226,7 @@ impl PlanarEngine {
         mismatch <= MISMATCH * largest + ROUNDING * speed * law.stiffness
     }
 
-    /// Makes the newest solution the iterate. The first states were a guess: any motion will do for one.
+    /// Makes the newest solution the iterate.
     #[inline(always)]
     fn accept(&mut self, levels: &Range<usize>, among: &Range<usize>) {
         self.floor.near(among, &self.quads, |_, corners, mean| corners.accept(mean));
@@ -240,40 +236,40 @@ impl PlanarEngine {
         }
     }
 
-    /// way · B · way, from the iterate to the mean motion of some levels and with the matrix B that it was solved with; and twice the kinetic
+    /// dᵀAd, with the search direction d from the iterate to the mean motion of `levels` and the matrix A that it was solved with; and twice the kinetic
     /// energy of the mean motion (erg).
     #[inline(always)]
-    fn measure<S: Simd>(&self, simd: S, levels: &Range<usize>, felt: &Articulated) -> [f64; 2] {
+    fn measure<S: Simd>(&self, simd: S, levels: &Range<usize>, at_root: &Articulated) -> [f64; 2] {
         let zero = Four::splat(simd, 0.0);
         let (mut metric, mut kinetic) = (zero, zero);
         let mut before = Two::splat(simd, 0.0);
         let quads = quads_of(levels);
         for (quad, iterate) in self.quads[quads.clone()].iter().zip(&self.iterate[quads]) {
-            let way: Motions<S> = std::array::from_fn(|i| quad.mean[i].on(simd) - iterate[i].on(simd));
-            let (inner, last) = inner(way[0], before);
+            let d: Motions<S> = std::array::from_fn(|i| quad.mean[i].on(simd) - iterate[i].on(simd));
+            let (inner, last) = inner(d[0], before);
             before = last;
-            metric += quad.metric(way, inner);
+            metric += quad.metric(d, inner);
             let [turn, x, z] = quad.mean_of_centre(simd);
             kinetic += quad.mass.on(simd) * fma(x, x, z * z) + quad.inertia.on(simd) * turn * turn;
         }
         let root = [0, 1, 2].map(|i| self.quads[0].mean[i].lane(0) - self.iterate[0][i].lane(0));
-        [Lanes::from(metric).sum() + felt.metric(root), Lanes::from(kinetic).sum()]
+        [Lanes::from(metric).sum() + at_root.metric(root), Lanes::from(kinetic).sum()]
     }
 
-    /// Lowers the cost between the iterate and the levels' mean motion, and moves the iterate there.
+    /// Line search: lowers the cost between the iterate and the mean motion of `levels`, and moves the iterate there.
     ///
-    /// With d the way and B the matrix that the mean motion was solved with, f'(t) = −(1 − t) dᵀBd as long as all corners stay on the
-    /// iterate's pieces. Of those that are on others at the end, these pieces' terms are taken out of it and what the law says at t is put in.
+    /// With the search direction d and the matrix A of the mean motion, f'(t) = −(1 − t) dᵀAd as long as all corners stay on the
+    /// iterate's pieces. For those that leave theirs, the piece's terms are replaced by the law at t.
     #[inline(always)]
     fn search<S: Simd>(
         &mut self,
         simd: S,
         levels: &Range<usize>,
         among: &Range<usize>,
-        felt: &Articulated,
+        at_root: &Articulated,
         law: &ContactLaw,
     ) -> Search {
-        let [metric, kinetic] = self.measure(simd, levels, felt);
+        let [metric, kinetic] = self.measure(simd, levels, at_root);
         let weight = self.gravity * self.time_step;
         if metric <= DONE_OF_GRAVITY * self.mass * weight * weight + DONE_OF_KINETIC * kinetic * self.count as f64 {
             return Search::Done;
@@ -318,7 +314,7 @@ impl PlanarEngine {
     }
 }
 
-/// The quads of the levels of some blocks.
+/// The quads of `levels`.
 fn quads_of(levels: &Range<usize>) -> Range<usize> {
     levels.start / 2..levels.end.div_ceil(2)
 }
@@ -398,18 +394,18 @@ mod tests {
             solve_part(&mut engine, start..levels.min(start + BLOCK));
             assert_eq!(means(&engine), before, "{start}");
         }
-        // Forces on the root's block are felt there as when all is solved: the rest is in what is felt of it.
+        // A torque on the root's block gives the motion there that solving the whole chain gives: the rest is in the distal inertia.
         engine.quads[1].torque = engine.quads[1].torque.map(|torque| torque + 1.0);
         solve_part(&mut engine, 0..BLOCK);
         let part = means(&engine);
         solve_part(&mut engine, 0..levels);
         let whole = means(&engine);
         assert_eq!(part[..BLOCK / 2], whole[..BLOCK / 2]);
-        assert!(apart(&whole, &before, 0..BLOCK / 2) > 1e-3, "the force is felt");
+        assert!(apart(&whole, &before, 0..BLOCK / 2) > 1e-3, "the torque acts");
     }
 
     #[test]
-    fn a_way_is_measured_by_what_made_it() {
+    fn the_metric_of_a_search_direction_is_the_work_of_what_caused_it() {
         let mut engine = landing();
         let levels = engine.levels;
         for part in [0..levels, BLOCK..3 * BLOCK] {
@@ -417,16 +413,16 @@ mod tests {
             for (iterate, quad) in engine.iterate.iter_mut().zip(&engine.quads) {
                 *iterate = quad.mean;
             }
-            // B · way is what is added to the right side.
+            // A d is what is added to the right side.
             let (torque, force) = (1.0, 10.0);
             engine.quads[5].torque = engine.quads[5].torque.map(|before| before + torque);
             engine.quads[7].momentum[2] = engine.quads[7].momentum[2].map(|before| before + force);
-            let felt = solve_part(&mut engine, part.clone());
-            let [found, _] = dispatch!(engine.level, simd => engine.measure(simd, &part, &felt));
-            let way = |k: usize, i: usize| engine.quads[k].mean[i] - engine.iterate[k][i];
-            let turns = way(5, 0) - way(5, 0).inner(way(4, 0).level(1));
-            let expected = torque * turns.sum() + force * way(7, 2).sum();
-            // Seen: 3e-12, for corners are stiff: what rounding leaves of velocities is multiplied.
+            let at_root = solve_part(&mut engine, part.clone());
+            let [found, _] = dispatch!(engine.level, simd => engine.measure(simd, &part, &at_root));
+            let d = |k: usize, i: usize| engine.quads[k].mean[i] - engine.iterate[k][i];
+            let turns = d(5, 0) - d(5, 0).inner(d(4, 0).level(1));
+            let expected = torque * turns.sum() + force * d(7, 2).sum();
+            // Contact stiffness multiplies the rounding of velocities: 3e-12.
             assert!((found - expected).abs() < 1e-10 * expected, "{found} {expected}");
         }
     }

@@ -1,21 +1,22 @@
-//! A step's contact by following a path, one change of a contact mode at a time, where Newton's method goes round in circles.
+//! A step's contact problem solved along a path, one change of a contact mode at a time, where Newton's method cycles.
 //!
 //! In the plane (x, z) of a corner's excess e = w − w* each mode of Coulomb's law is a cone: open z > 0, sticking |x| ≤ −μ z, sliding what is left of
-//! z ≤ 0 on either side. The cones fill the plane and the impulse λ(e) is continuous where they meet. So what all corners are to fulfil,
+//! z ≤ 0 on either side. The cones fill the plane and the impulse λ(e) is continuous where they meet. So the contact problem,
 //!
 //! ```text
 //! e − W λ(e) − q = 0
 //! ```
 //!
-//! with W their velocities per impulse and q the excess without impulses, is linear for each choice of modes and continuous. The path begins at some e in the
-//! cones of the modes at hand, where that is not zero but r, and goes where it is t r with t falling from 1: straight towards the solution for these modes, which one
-//! pass of the recursion gives, until a first corner comes to the border of its cone. This corner changes its mode, and the path goes on: towards the solution for the new modes, or
-//! away from it (t grows) where only that leads across the border. It ends where a solution lies in the cones of its modes.
+//! with the Delassus matrix W (velocities per impulse) and the excess q without impulses, is continuous, and linear for each choice of modes. The path begins
+//! at some e in the cones of the present modes, where the left side is r, and follows left side = t r with t falling from 1: straight towards the solution for
+//! these modes, which one solve of the recursion gives, until a first corner reaches the border of its cone. This corner changes its mode, and the path goes on
+//! towards the solution for the new modes, or away from it (t grows) where only that leads across the border. It ends where a solution lies in the cones of
+//! its modes.
 //!
-//! From the modes that Newton's method came to the path is short, but may go to infinity. From open corners with r > 0 along z it is Lemke's, and ends. For
+//! From the last modes of Newton's method the path is short, but may go to infinity. From open corners with r > 0 along z it is Lemke's, and ends. For
 //! by the law λᵀe ≤ −R |λ_n|², while λᵀe = λᵀWλ + λᵀ(q + t r) ≥ λᵀ(q + t r): where t is large this is positive unless all corners are open, and
-//! elsewhere R |λ_n|² ≤ −λᵀ(q + t r) bounds λ. Where corners come to borders at the same time, rounding decides who is first. Of several solutions
-//! (Painlevé) it is the one that the path comes to.
+//! elsewhere R |λ_n|² ≤ −λᵀ(q + t r) bounds λ. Where corners reach borders at the same time, rounding decides the order. Of several solutions
+//! (Painlevé) it gives the one at the path's end.
 //!
 //! C. E. Lemke, Management Science 11 (1965); D. E. Stewart and J. C. Trinkle, Int. J. Numer. Meth. Eng. 39 (1996); D. Ralph, Math. Oper. Res. 19 (1994)
 //! and S. P. Dirkse and M. C. Ferris, Optim. Methods Softw. 5 (1995) (paths of piecewise linear equations).
@@ -28,21 +29,21 @@ use super::contact::{Corners, OPEN, PUSHED_FORWARD, STICKS};
 use super::lanes::fma;
 use super::law::ContactLaw;
 
-/// Changes of modes per place of corners near the floor after which the path is left. Seen: up to 11.
+/// Mode changes per place with candidates after which a path is given up; up to 11 were needed.
 const MOST_CHANGES: usize = 16;
-/// Where a corner begins that is not in the cone of its mode: above the floor, or aside of the border to sticking (cm/s).
+/// Excess velocity (cm/s), above the floor or beside the border to sticking, at which a corner begins that is not in its mode's cone.
 const OFF_THE_BORDER: f64 = 1.0;
-/// Corners that begin above the floor do so at heights that differ by up to this share, so that few come to borders at the same time.
+/// Fraction by which these first velocities differ among open corners, so that few reach borders at the same time.
 const UNEVEN: f64 = 0.5;
 
-/// Multiples of this have fractional parts that fill the line from 0 to 1 evenly.
+/// Golden ratio: fractional parts of its multiples fill [0, 1] evenly.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// Where a path begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Start {
-    /// With the modes at hand, which the step has just been solved for.
-    AtHand,
+    /// With the modes of the newest solution.
+    Present,
     /// With all corners open.
     Open,
 }
@@ -53,10 +54,10 @@ pub(super) struct Pair {
     place: usize,
     near: [bool; 2],
     friction: [f64; 2],
-    states: [f64; 2],
-    /// The borders g = a·e ≥ 0 of their cones; zero where there is none.
+    modes: [f64; 2],
+    /// Normals a of the cones' borders a·e ≥ 0; zero where there is none.
     borders: [[f64x2; 2]; 2],
-    /// Excess (cm/s) where the path is, and in the solution for the modes.
+    /// Excess velocities (cm/s) on the path, and in the solution for the modes.
     at: [f64x2; 2],
     to: [f64x2; 2],
 }
@@ -74,27 +75,27 @@ fn set_lane(of: &mut f64x2, lane: usize, to: f64) {
 }
 
 impl Pair {
-    /// Corners with these excesses (cm/s) in the solution of the piece at hand. The path begins there, but for those that are not in the cones of their
-    /// states: these begin in them, pressed down by so much (cm/s).
+    /// Corners with these excess velocities (cm/s) in the newest solution. The path begins there, except for corners outside their mode's cone: they begin
+    /// in it, pressed down by `pressed` (cm/s).
     #[inline(always)]
     fn new(place: usize, corners: &Corners, excess: [f64x2; 2], pressed: f64) -> Self {
-        let states = corners.states();
-        let mut pair = Self { place, states, at: excess, to: excess, ..Self::default() };
+        let modes = corners.modes();
+        let mut pair = Self { place, modes, at: excess, to: excess, ..Self::default() };
         let agree = corners.agree();
         for lane in 0..2 {
             let Some((_, friction)) = corners.near(lane) else { continue };
             (pair.near[lane], pair.friction[lane]) = (true, friction);
-            pair.enter(lane, states[lane]);
+            pair.enter(lane, modes[lane]);
             if agree[lane] {
                 continue;
             }
             let [x, z] = excess.map(|part| part.to_array()[lane]);
-            let [x, z] = if states[lane] == OPEN {
+            let [x, z] = if modes[lane] == OPEN {
                 [x, OFF_THE_BORDER]
-            } else if states[lane] == STICKS {
+            } else if modes[lane] == STICKS {
                 [0.0, -pressed]
             } else {
-                let (z, sign) = (z.min(-pressed), -states[lane].signum());
+                let (z, sign) = (z.min(-pressed), -modes[lane].signum());
                 let least = -friction * z;
                 [if x * sign > least { x } else { sign * (least + OFF_THE_BORDER) }, z]
             };
@@ -104,7 +105,7 @@ impl Pair {
         pair
     }
 
-    /// Begins with open corners, that have these excesses (cm/s) if they stay so. `index` makes them differ from others.
+    /// Begins with open corners, which have these excess velocities (cm/s) while open. `index` makes them differ from others.
     #[inline(always)]
     fn open(&mut self, excess: [f64x2; 2], index: usize) {
         self.to = excess;
@@ -117,30 +118,30 @@ impl Pair {
         }
     }
 
-    /// Puts a corner in a state.
+    /// Sets a corner's mode.
     #[inline(always)]
-    fn enter(&mut self, lane: usize, state: f64) {
-        self.states[lane] = state;
+    fn enter(&mut self, lane: usize, mode: f64) {
+        self.modes[lane] = mode;
         let friction = self.friction[lane];
-        let borders = if state == OPEN {
+        let borders = if mode == OPEN {
             [[0.0, 1.0], [0.0, 0.0]]
-        } else if state == STICKS {
+        } else if mode == STICKS {
             [[-1.0, -friction], [1.0, -friction]]
         } else {
-            [[0.0, -1.0], [-state.signum(), friction]]
+            [[0.0, -1.0], [-mode.signum(), friction]]
         };
         for (border, numbers) in self.borders.iter_mut().zip(borders) {
             (0..2).for_each(|k| set_lane(&mut border[k], lane, numbers[k]));
         }
     }
 
-    /// The state beyond a border of a corner's cone.
+    /// The mode beyond a border of a corner's cone.
     #[inline(always)]
     fn mode_beyond(&self, lane: usize, border: usize) -> f64 {
-        let state = self.states[lane];
-        if state == OPEN {
+        let mode = self.modes[lane];
+        if mode == OPEN {
             PUSHED_FORWARD.copysign(-self.at[0].to_array()[lane])
-        } else if state == STICKS {
+        } else if mode == STICKS {
             if border == 0 { -PUSHED_FORWARD } else { PUSHED_FORWARD }
         } else if border == 0 {
             OPEN
@@ -149,11 +150,11 @@ impl Pair {
         }
     }
 
-    /// Where a corner comes to a border before the share `first` of the way towards the solution, backward if `direction` is −1: the share, lane and border.
+    /// Where a corner reaches a border before the fraction `first` of the way to the solution, backward if `direction` is −1: fraction, lane and border.
     #[inline(always)]
     fn leaves_before(&self, first: f64, direction: f64x2) -> Option<(f64, usize, usize)> {
-        let way = [0, 1].map(|k| (self.to[k] - self.at[k]) * direction);
-        let fall = self.borders.map(|border| -dot(border, way));
+        let step = [0, 1].map(|k| (self.to[k] - self.at[k]) * direction);
+        let fall = self.borders.map(|border| -dot(border, step));
         let left = self.borders.map(|border| dot(border, self.at).fast_max(f64x2::ZERO));
         let before = [0, 1].map(|k| fall[k].simd_gt(f64x2::ZERO) & left[k].simd_lt(fall[k] * f64x2::splat(first)));
         // Most corners do not.
@@ -171,13 +172,13 @@ impl Pair {
         found
     }
 
-    /// Goes a share of the way.
+    /// Moves along the path by a fraction of the way to the solution.
     #[inline(always)]
     fn go(&mut self, share: f64x2) {
         (0..2).for_each(|k| self.at[k] = fma(share, self.to[k] - self.at[k], self.at[k]));
     }
 
-    /// Changes a corner that has come to a border, and returns that border.
+    /// Changes the mode of a corner at a border, and returns that border.
     #[inline(always)]
     fn cross(&mut self, lane: usize, border: usize) -> [f64; 2] {
         let crossed = self.borders[border].map(|part| part.to_array()[lane]);
@@ -185,7 +186,7 @@ impl Pair {
         crossed
     }
 
-    /// Whether a corner goes across the border by which it came into its state when it goes towards the solution.
+    /// True if towards the solution a corner moves further across the border by which it came into its mode.
     #[inline(always)]
     fn goes_across(&self, lane: usize, border: [f64; 2]) -> bool {
         let [x, z] = [0, 1].map(|k| (self.to[k] - self.at[k]).to_array()[lane]);
@@ -194,7 +195,7 @@ impl Pair {
 }
 
 impl PlanarEngine {
-    /// Follows a path to a solution of the whole chain's contact; whether it has come to one. Out of line, for few steps come here.
+    /// Follows a path; true if it ends in a solution of the whole chain's contact. Out of line, for few steps come here.
     #[inline(never)]
     pub(super) fn follow_path<S: Simd>(&mut self, simd: S, start: Start, law: &ContactLaw) -> bool {
         self.paths += 1;
@@ -210,7 +211,7 @@ impl PlanarEngine {
         solved
     }
 
-    /// Goes to the path's end, or to where rounding loses it: on to infinity, or in circles about a point where several corners change.
+    /// Follows the path to its end, or until it is lost: to infinity, or by rounding in a cycle about a point where several modes change.
     #[inline(always)]
     fn go_along_path(&mut self, pairs: &mut Vec<Pair>, start: Start, law: &ContactLaw) {
         let (levels, all) = (0..self.levels, self.floor.all());
@@ -240,7 +241,7 @@ impl PlanarEngine {
             let Some((k, lane, border)) = changes else { return };
             pairs.iter_mut().for_each(|pair| pair.go(f64x2::splat(direction * first)));
             let crossed = pairs[k].cross(lane, border);
-            self.floor.set_modes(pairs[k].place, pairs[k].states);
+            self.floor.set_modes(pairs[k].place, pairs[k].modes);
             self.solve_with_modes(&levels, &all, law);
             pairs.iter_mut().for_each(|pair| pair.to = self.floor.excess(pair.place, &self.quads));
             direction = if pairs[k].goes_across(lane, crossed) { 1.0 } else { -1.0 };
@@ -257,8 +258,8 @@ mod tests {
     use crate::engine::Engine;
     use crate::experiment::{self, Source};
 
-    /// In every step of robots on smooth and on rough ground the path from open corners leads to a solution, and most that begin with the modes of the
-    /// step before. Where friction is low it is that of Newton's method, for there is no other.
+    /// In every step, on smooth and on rough ground, the path from open corners leads to a solution, and so do nearly all that begin with the modes of the
+    /// step before. At low friction the solution is unique, so it is that of Newton's method.
     #[test]
     fn every_path_leads_to_a_solution() {
         for (low, high, film_fraction) in [(0.3_f64, 0.3, 0.0), (0.2, 4.0, 0.667), (8.0, 0.1, 0.25)] {
@@ -288,7 +289,7 @@ mod tests {
                     found
                 };
                 let newton = means(&mut |engine| dispatch!(engine.level, simd => engine.solve_on_floor(simd, &law)).unwrap());
-                for begin in [Start::AtHand, Start::Open] {
+                for begin in [Start::Present, Start::Open] {
                     let mut solved = false;
                     let path = means(&mut |engine| {
                         let all = engine.floor.all();
@@ -297,7 +298,7 @@ mod tests {
                             engine.follow_path(simd, begin, &law)
                         });
                     });
-                    if !solved && begin == Start::AtHand {
+                    if !solved && begin == Start::Present {
                         lost += 1;
                         continue;
                     }

@@ -7,25 +7,25 @@ use super::lanes::{Four, Lanes, fma};
 use super::quad::direction;
 
 impl PlanarEngine {
-    /// Shows `look` the links as they stand now.
-    pub(super) fn posed<T>(&mut self, look: impl FnOnce(&Self) -> T) -> T {
+    /// Calls `read` with the links in their present pose instead of that of the last step's middle.
+    pub(super) fn with_present_pose<T>(&mut self, read: impl FnOnce(&Self) -> T) -> T {
         for (quad, kept) in self.quads.iter_mut().zip(&mut self.scratch) {
             *kept = quad.along;
             quad.along = direction(quad.angle);
             dispatch!(self.level, simd => quad.lay(simd));
         }
-        let seen = look(self);
+        let result = read(self);
         for (quad, kept) in self.quads.iter_mut().zip(&self.scratch) {
             quad.along = *kept;
             dispatch!(self.level, simd => quad.lay(simd));
         }
-        seen
+        result
     }
 
-    /// Position and velocity of the left end of the chain, as the links are turned, with the state's velocities.
+    /// Position (cm) and velocity (cm/s) of the chain's left end, in the links' present pose.
     pub(super) fn left_end(&self) -> ([f64; 2], [f64; 2]) {
         let [mut position, mut velocity, _] = dispatch!(self.level, simd => self.root_motion(simd));
-        // The left arm's other ends are left ends.
+        // On the left arm the far ends are left ends.
         for i in (0..self.root).rev() {
             let [x, z] = [0, 1].map(|k| self.of_body(i, |quad| quad.across[k]));
             let rate = self.of_body(i, |quad| quad.motion[0]);
@@ -35,12 +35,12 @@ impl PlanarEngine {
         (position, velocity)
     }
 
-    /// Body `i` from its left end to its right one (cm).
+    /// Vector of body `i` from its left end to its right end (cm).
     pub(super) fn body_vector(&self, i: usize) -> [f64; 2] {
         [0, 1].map(|k| self.lengths[i] * self.of_body(i, |quad| quad.along[k]))
     }
 
-    /// The nodes' x and z (cm). The links' directions are turned on from the middle of the last step, whose directions are known.
+    /// The nodes' x and z (cm), at a small fraction of a step's cost: the links' directions are turned on from those of the last step's middle.
     #[inline(always)]
     pub(super) fn places_here<S: Simd>(&mut self, simd: S, nodes: &mut [[f64; 2]]) {
         let zero = Four::splat(simd, 0.0);
@@ -59,7 +59,7 @@ impl PlanarEngine {
         let step = |at: [f64; 2], lane: usize, of: &[Lanes; 2]| [at[0] + of[0].lane(lane), at[1] + of[1].lane(lane)];
         let mut right = step(left, 0, &self.scratch[0]);
         (nodes[self.root], nodes[self.root + 1]) = (left, right);
-        // Outwards from the root on both sides: the far ends of the two bodies of each tree level.
+        // The far ends of the two bodies of each tree level, base to tip.
         for level in 1..self.levels {
             let (of, lane) = (&self.scratch[level / 2], 2 * (level % 2));
             if level <= self.root {

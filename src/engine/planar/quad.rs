@@ -12,69 +12,69 @@ use wide::f64x2;
 
 use super::lanes::{Four, Lanes, fma, on};
 
-/// Turn, x, z.
+/// A spatial vector (turn, x, z).
 pub(super) type Spatial = [f64; 3];
-/// The same of two bodies.
+/// Those of two bodies.
 pub(super) type Spatials = [f64x2; 3];
-/// The same of four.
+/// Those of four bodies, in registers.
 pub(super) type Motions<S> = [Four<S>; 3];
 
-/// The largest turn (rad) for which the series in [`turned`] are exact to the last digit: the first term left out is 6·10⁻¹⁷ of the turn.
+/// Largest turn (rad) for which the series in [`turned`] are exact to rounding: the first term left out is 6·10⁻¹⁷ of the turn.
 const LARGEST_SERIES: f64 = 0.03;
 
-/// Four bodies: what stays, their state, and what the step at hand needs.
+/// Four bodies: constants, state, and quantities of the current step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Quad {
     pub(super) mass: Lanes,
-    /// Share of the robot's mass.
+    /// Fraction of the robot's mass.
     pub(super) share: Lanes,
-    /// How far the centre of mass of the robot, seen from the root, lies along the links (cm): it is the sum of lever · along.
+    /// Lever (cm): from the root's reference point to the robot's centre of mass is the sum of lever · along over all bodies.
     pub(super) lever: Lanes,
-    /// About the centre of mass and about the reference point (g·cm²).
+    /// Moment of inertia about the centre of mass and about the reference point (g·cm²).
     pub(super) inertia: Lanes,
     pub(super) inertia_at_reference: Lanes,
-    /// From the reference point to the other end (cm), negative on the left arm.
+    /// From the reference point to the far end (cm), negative on the left arm.
     pub(super) reach: Lanes,
-    /// Of the joint at the reference point (dyn·cm/rad); none where there is no body.
+    /// Stiffness of the joint at the reference point (dyn·cm/rad); zero in padding lanes.
     pub(super) stiffness: Lanes,
-    /// What spring and damper of the joint at the reference point add to that joint's inertia.
+    /// What spring and damper of the joint at the reference point add to its articulated inertia.
     pub(super) implicit: Lanes,
-    /// Where the centre of mass lies between the reference point (0) and the other end (1).
+    /// Position of the centre of mass between the reference point (0) and the far end (1).
     pub(super) middle: Lanes,
     /// Angle above the x axis (rad), counted anticlockwise.
     pub(super) angle: Lanes,
     /// Rate (rad/s) and velocity of the centre of mass (cm/s).
     pub(super) motion: [Lanes; 3],
-    /// Voltage on the joint as seen from the root: negative on the right arm (V).
+    /// Voltage on the joint (V), in the sense of rotation from the root outwards: negative on the right arm.
     pub(super) volts: Lanes,
-    /// Angle at which the joint's spring is at rest, body towards the root to this one (rad).
+    /// Rest angle of the joint's spring (rad), from the proximal body to this one.
     pub(super) rest_angle: Lanes,
-    /// The angle that `along`, the direction from left end to right one, is of, and the other end less the reference point (cm).
+    /// Angle at which the directions are taken (rad), the unit vector from left to right end, and the vector from reference point to far end (cm).
     pub(super) posed: Lanes,
     pub(super) along: [Lanes; 2],
     pub(super) across: [Lanes; 2],
-    /// The centres of mass less the reference points (cm).
+    /// Vector from the reference point to the centre of mass (cm).
     pub(super) half: [Lanes; 2],
-    /// Momentum about the reference point that the mean motion is to have, and the joint's part of it.
+    /// Right side of the step about the reference point: momentum, and the joint's angular impulse.
     pub(super) momentum: [Lanes; 3],
     pub(super) torque: Lanes,
-    /// Of the walk to the root: the mean rate is `own` + `carried` · (turn, −x, −z) of the inner body at the reference point.
+    /// Result of the tip-to-base pass: the mean rate is `own` + `carried` · (turn, −x, −z) of the proximal body at the reference point.
     pub(super) carried: [Lanes; 3],
     pub(super) own: Lanes,
-    /// What the joint's rate is accelerated by: its articulated inertia and the implicit part. None for the root.
+    /// D: articulated inertia about the joint's axis plus the implicit part. Unused for the root.
     pub(super) pivot: Lanes,
     /// Mean motion of the reference point over the step.
     pub(super) mean: [Lanes; 3],
 }
 
 impl Quad {
-    /// Bodies without mass, whose joints do nothing.
+    /// Padding.
     pub(super) fn empty() -> Self {
         let one = Lanes::splat(1.0);
         Self { implicit: one, middle: Lanes::splat(0.5), along: [one, Lanes::ZERO], ..Self::default() }
     }
 
-    /// Puts the links where `along` says that they point.
+    /// Sets the links' vectors from their directions.
     #[inline(always)]
     pub(super) fn lay<S: Simd>(&mut self, simd: S) {
         let (reach, middle) = (self.reach.on(simd), self.middle.on(simd));
@@ -84,8 +84,8 @@ impl Quad {
         }
     }
 
-    /// Turns the links to the angles `to` (rad), on from where they were by the series of sine and cosine, which is several times faster than
-    /// computing both anew, unless they shall be `exact` or turn far.
+    /// Turns the links to the angles `to` (rad): by series of sine and cosine of the turn, which is several times faster than computing both anew, unless
+    /// `exact` or the turn is large.
     #[inline(always)]
     pub(super) fn turn_to<S: Simd>(&mut self, to: Four<S>, exact: bool) {
         let simd = to.simd;
@@ -101,7 +101,7 @@ impl Quad {
         self.lay(simd);
     }
 
-    /// Where the links point at their angles of now, with what `along` is known to be of; nothing is changed.
+    /// Directions at the present angles; nothing is changed.
     #[inline(always)]
     pub(super) fn along_now<S: Simd>(&self, simd: S) -> [Four<S>; 2] {
         let by = self.angle.on(simd) - self.posed.on(simd);
@@ -112,8 +112,8 @@ impl Quad {
         }
     }
 
-    /// Sets the joints' parts of the step's right side, −`share` (s) of their torques at the angles as they are, with the bodies towards the
-    /// root at `inner` (rad). The implicit part adds what the mean rate makes.
+    /// Sets the joints' part of the step's right side, −`share` (s) times their torques at the present angles, with the proximal bodies at `inner` (rad).
+    /// The implicit part adds the effect of the mean rate.
     #[inline(always)]
     pub(super) fn load_torque<S: Simd>(&mut self, share: f64, inner: Four<S>) {
         let simd = inner.simd;
@@ -126,17 +126,17 @@ impl Quad {
         self.of_centre(on(simd, &self.mean))
     }
 
-    /// What the way of these bodies adds to way · matrix · way of the newest solution: by each joint, its pivot times the square of what it
-    /// turns by itself, for the recursion makes the matrix diagonal. With the `inner` ones' rates.
+    /// What these bodies add to dᵀAd, with the search direction `d` and the matrix A of the newest solution: for each joint D times the square of its own
+    /// turn, for the recursion factorises A. `inner` are the rates of the proximal bodies.
     #[inline(always)]
-    pub(super) fn metric<S: Simd>(&self, way: Motions<S>, inner: Four<S>) -> Four<S> {
-        let [turn, x, z] = way;
+    pub(super) fn metric<S: Simd>(&self, d: Motions<S>, inner: Four<S>) -> Four<S> {
+        let [turn, x, z] = d;
         let [a, b, c] = on(inner.simd, &self.carried);
         let own = fma(-a, inner, turn) + fma(b, x, c * z);
         self.pivot.on(inner.simd) * own * own
     }
 
-    /// The motion of the centres of mass where that of the reference points is `motion`.
+    /// Motion of the centres of mass, from that of the reference points.
     #[inline(always)]
     pub(super) fn of_centre<S: Simd>(&self, motion: Motions<S>) -> Motions<S> {
         let [turn, x, z] = motion;
@@ -144,7 +144,7 @@ impl Quad {
         [turn, fma(-turn, half_z, x), fma(turn, half_x, z)]
     }
 
-    /// Puts the momentum `about_centre` about the reference point.
+    /// Sets the momentum about the reference point from that about the centre of mass.
     #[inline(always)]
     pub(super) fn load<S: Simd>(&mut self, about_centre: Motions<S>) {
         let [turn, x, z] = about_centre;
@@ -153,12 +153,12 @@ impl Quad {
     }
 }
 
-/// Directions of angles.
+/// Unit vectors at angles (rad).
 pub(super) fn direction(angle: Lanes) -> [Lanes; 2] {
     [angle.map(f64::cos), angle.map(f64::sin)]
 }
 
-/// Directions turned by small angles (rad): with t the tangent of half an angle, sin = 2 t/(1 + t²) and cos = 1 − t sin.
+/// Unit vectors turned by small angles (rad): with t = tan(angle/2), sin = 2 t/(1 + t²) and cos = 1 − t sin.
 #[inline(always)]
 fn turned<S: Simd>([x, z]: [Four<S>; 2], by: Four<S>) -> [Four<S>; 2] {
     let c = |value: f64| Four::splat(by.simd, value);
@@ -168,8 +168,8 @@ fn turned<S: Simd>([x, z]: [Four<S>; 2], by: Four<S>) -> [Four<S>; 2] {
     [fma(-sin, fma(t, x, z), x), fma(sin, fma(-t, z, x), z)]
 }
 
-/// Inertia (00, 01, 02, 11, 12, 22) and force at a point of both arms; and the inertia's entries 10, 20, 21 where corners slide by Coulomb's
-/// law, whose impulse is not along what it depends on. They are zero and not read where none does.
+/// Articulated inertia (00, 01, 02, 11, 12, 22) and bias force of both arms at a point. `lower` are the entries 10, 20, 21, which differ from the upper ones
+/// where corners slide by Coulomb's law; they are zero and not read where none does.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Arms {
     pub(super) inertia: [f64x2; 6],

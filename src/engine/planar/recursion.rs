@@ -17,7 +17,7 @@ pub(super) trait ContactTerms {
     fn take(&mut self, level: usize) -> Option<Arms>;
 }
 
-/// The same of one body.
+/// Articulated inertia and bias force at one point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Articulated {
     inertia: [f64; 6],
@@ -25,20 +25,20 @@ pub(super) struct Articulated {
     force: Spatial,
 }
 
-/// The joints of two bodies as those towards the root feel them; the default lets nothing through.
+/// The joints of two bodies, as the proximal bodies need them; the default transmits nothing.
 #[derive(Debug, Clone, Copy, Default)]
 struct Joints {
-    /// 1/D with D = I₀₀ + implicit.
+    /// 1/D, with D = I₀₀ + implicit.
     inverse: f64x2,
     implicit: f64x2,
     own: f64x2,
 }
 
 impl Arms {
-    /// Goes through the joints of the bodies outside, moves from a level's other ends to its reference points, and adds the level itself.
+    /// Transmits the distal articulated inertia through its joints, shifts it from a level's far ends to its reference points, and adds the level itself.
     ///
-    /// With c the first column of the inertia I outside, what is felt of it is I − c cᵀ/D, of which the first column is c · implicit/D:
-    /// nothing is lost where a joint is soft. All that can be made of I before 1/D is known is made apart, for 1/D is waited for.
+    /// With c the first column of the distal inertia I, I − c cᵀ/D is transmitted. Its first column is computed as c · implicit/D, without
+    /// cancellation where a joint is soft. What does not need 1/D comes first, to hide the division's latency.
     #[inline(always)]
     fn take<const SKEW: bool>(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, level: usize) {
         if SKEW {
@@ -54,9 +54,9 @@ impl Arms {
         let squares = fma(wx * wx, i11, fma(wz * wz, i22, (wx + wx) * wz * i12));
         let moved = fma(wx, c1, wz * c2);
         let soft = implicit - moved;
-        let felt = fma(implicit, c0 + (moved + moved), -(moved * moved));
+        let transmitted = fma(implicit, c0 + (moved + moved), -(moved * moved));
         self.inertia = [
-            fma(felt, inverse, inertia + squares),
+            fma(transmitted, inverse, inertia + squares),
             fma(c1 * soft, inverse, fma(-mass, half_z, ux)),
             fma(c2 * soft, inverse, fma(mass, half_x, uz)),
             fma(-c1 * c1, inverse, i11 + mass),
@@ -71,7 +71,7 @@ impl Arms {
         ];
     }
 
-    /// The same where the inertia is not symmetric: with its first row r, what is felt of it is I − c rᵀ/D.
+    /// [`take`](Self::take) for an inertia that is not symmetric: with its first row r, I − c rᵀ/D is transmitted.
     #[inline(always)]
     fn take_skew(&mut self, through: &Joints, across: [f64x2; 2], quad: &Quad, level: usize) {
         let Joints { inverse, implicit, own } = *through;
@@ -83,9 +83,9 @@ impl Arms {
         let squares = fma(wx * wx, i11, fma(wz * wz, i22, wx * wz * (i12 + i21)));
         let [row, column] = [fma(wx, r1, wz * r2), fma(wx, c1, wz * c2)];
         let [soft_row, soft_column] = [implicit - row, implicit - column];
-        let felt = fma(implicit, c0 + (row + column), -(row * column));
+        let transmitted = fma(implicit, c0 + (row + column), -(row * column));
         self.inertia = [
-            fma(felt, inverse, inertia + squares),
+            fma(transmitted, inverse, inertia + squares),
             fma(r1 * soft_column, inverse, fma(-mass, half_z, fma(wx, i11, wz * i21))),
             fma(r2 * soft_column, inverse, fma(mass, half_x, fma(wx, i12, wz * i22))),
             fma(-c1 * r1, inverse, i11 + mass),
@@ -105,9 +105,9 @@ impl Arms {
         ];
     }
 
-    /// Adds what corners do to the bodies of a level.
+    /// Adds the contact terms of a level.
     #[inline(always)]
-    fn touch<const SKEW: bool>(&mut self, by: &Self) {
+    fn add<const SKEW: bool>(&mut self, by: &Self) {
         (0..6).for_each(|k| self.inertia[k] += by.inertia[k]);
         if SKEW {
             (0..3).for_each(|k| self.lower[k] += by.lower[k]);
@@ -115,7 +115,7 @@ impl Arms {
         (0..3).for_each(|k| self.force[k] += by.force[k]);
     }
 
-    /// Solves the joints at the level's reference points.
+    /// Eliminates the joints at the level's reference points.
     #[inline(always)]
     fn joints(&self, quad: &mut Quad, level: usize) -> Joints {
         let implicit = quad.implicit.level(level);
@@ -130,7 +130,7 @@ impl Arms {
         Joints { inverse, implicit, own }
     }
 
-    /// The whole chain at the root's reference point: the right arm hangs on the root's other end, the left arm on the point itself.
+    /// The whole chain at the root's reference point: the left arm hangs there, the right arm on the root's far end.
     #[inline(always)]
     fn at_root<const SKEW: bool>(mut self, through: &Joints, root: &Quad) -> Articulated {
         self.take::<SKEW>(through, root_ends(root), root, 0);
@@ -142,22 +142,22 @@ impl Arms {
     }
 }
 
-/// Where the arms hang on the root, from its reference point (cm): the left one on the point itself, the right one on the other end.
+/// Where the arms hang on the root, from its reference point (cm).
 #[inline(always)]
 fn root_ends(root: &Quad) -> [f64x2; 2] {
     [0, 1].map(|k| f64x2::new([0.0, root.across[k].lane(0)]))
 }
 
 impl Articulated {
-    /// way · inertia · way.
+    /// dᵀ · inertia · d.
     #[inline(always)]
     pub(super) fn metric(&self, [turn, x, z]: Spatial) -> f64 {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
         turn * (i00 * turn + 2.0 * (i01 * x + i02 * z)) + x * (i11 * x + 2.0 * i12 * z) + z * i22 * z
     }
 
-    /// The motion x of a free body: inertia · x = force. Translation is eliminated first, for a long chain's turn is badly conditioned;
-    /// without fractions, so that no division waits for another.
+    /// The motion of a free body, from inertia · motion = force. Translation is eliminated first, for a long chain's turn is badly conditioned; without
+    /// fractions, so that no division waits for another.
     #[inline(always)]
     fn motion<const SKEW: bool>(&self) -> Spatial {
         let [i00, i01, i02, i11, i12, i22] = self.inertia;
@@ -175,28 +175,28 @@ impl Articulated {
     }
 }
 
-/// What the root hangs on.
+/// How the root is joined to the world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BaseJoint {
-    /// Nothing.
+    /// Not at all.
     Free,
-    /// The world.
+    /// Rigidly.
     Clamped,
-    /// A hinge at its reference point, with the level's own torque and implicit terms.
+    /// By a hinge at its reference point, with the level's own torque and implicit terms.
     Hinged,
 }
 
-/// Levels of a block, of which a part of a long chain is made; an even number.
+/// Tree levels of a block; an even number. A part of a long chain is a run of blocks.
 pub(super) const BLOCK: usize = 8;
 
-/// What is felt at the outer end of a block of all that is further out; the default is nothing.
+/// Distal articulated inertia and bias force at a block's far end; the default is none.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Distal {
     arms: Arms,
     through: Joints,
 }
 
-/// The chain as it is felt at the root, which is all of it, and the root's motion.
+/// Articulated inertia and bias force of the whole chain at the root, and the root's motion.
 #[inline(always)]
 fn root_motion<const SKEW: bool>(
     chain: Arms,
@@ -221,10 +221,10 @@ fn root_motion<const SKEW: bool>(
     (whole, whole.motion::<SKEW>())
 }
 
-/// Mean motions u of the chain: (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques. Corners touch the `floor` as their states say.
+/// Solves (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques for the mean motions u, with `contact` in its present modes.
 ///
-/// Of the `levels` of some blocks only: bodies further in move as they did, and those further out are felt as they last were. What is
-/// felt goes to `outside`, by block, unless it is empty. Returns the chain as it is felt at the root, if that is among `levels`.
+/// Only for `levels`, a run of blocks: proximal bodies keep their motion, and distal ones act through the inertia and force stored in `distal`, which is
+/// updated block by block unless it is empty. Returns the whole chain at the root, if that is among `levels`.
 #[inline(always)]
 pub(super) fn solve<const SKEW: bool>(
     quads: &mut [Quad],
@@ -246,7 +246,7 @@ pub(super) fn solve<const SKEW: bool>(
             let (quad, level) = (&mut quads[k / 2], k % 2);
             chain.take::<SKEW>(&through, pair(&quad.across, level), quad, level);
             if let Some(by) = contact.take(k) {
-                chain.touch::<SKEW>(&by);
+                chain.add::<SKEW>(&by);
             }
             through = chain.joints(quad, level);
         }
@@ -277,7 +277,7 @@ pub(super) fn solve<const SKEW: bool>(
         across = pair(&quad.across, level);
     }
     if levels.end % 2 == 1 {
-        // Bodies without mass outside of the last follow it.
+        // Padding moves with its proximal neighbour.
         set(&mut quads[levels.end / 2], 1, [turn, x, z]);
     }
     whole

@@ -6,7 +6,7 @@ use super::quad::Quad;
 use super::{EngineError, PlanarEngine, place};
 
 impl PlanarEngine {
-    /// All lanes as they are, with the sums of energy.
+    /// All lanes, with the sums for the energy audit.
     pub(super) fn write_checkpoint(&self, into: &mut Vec<f64>) {
         for Quad { angle, posed, along: [x, z], motion: [a, b, c], .. } in &self.quads {
             for lanes in [angle, posed, x, z, a, b, c] {
@@ -32,15 +32,15 @@ impl PlanarEngine {
         self.floor.restore(corners);
         self.step = step as u64;
         (self.centre, self.velocity, self.work_sums, self.numerical_loss) = ([x, z], [vx, vz], [volts, squares], loss);
-        if let Some(beyond) = &mut self.extensions {
-            beyond.restore(memory);
+        if let Some(extensions) = &mut self.extensions {
+            extensions.restore(memory);
         }
         self.finite = true;
         Ok(())
     }
 
     /// Angles of the bodies (rad, anticlockwise), then rate (rad/s) and velocity of the centre of mass (cm/s) of each, then centre of mass and
-    /// velocity of the robot, then the directions of the last step's middle with their angles, then the corners' states.
+    /// velocity of the robot, then the directions of the last step's middle with their angles, then contact modes, then the memory of joint extensions.
     pub(super) fn state_numbers(&self) -> Vec<f64> {
         let bodies = || 0..self.count;
         let mut state: Vec<f64> = bodies().map(|i| self.of_body(i, |quad| quad.angle)).collect();
@@ -75,19 +75,19 @@ impl PlanarEngine {
             (0..3).for_each(|k| at.motion[k].set_lane(lane, motions[3 * i + k]));
             (0..2).for_each(|k| at.along[k].set_lane(lane, along[2 * i + k]));
         }
-        self.follow();
+        self.fill_padding();
         (self.centre, self.velocity) = ([centre[0], centre[1]], [centre[2], centre[3]]);
         self.floor.restore(corners);
-        if let Some(beyond) = &mut self.extensions {
-            beyond.restore(memory);
+        if let Some(extensions) = &mut self.extensions {
+            extensions.restore(memory);
         }
         self.finite = false;
         self.step = step;
         Ok(())
     }
 
-    /// Turns bodies without mass as their inner neighbours are turned: steps keep them so.
-    fn follow(&mut self) {
+    /// Gives padding lanes the pose and rate of their proximal neighbours, which steps preserve.
+    fn fill_padding(&mut self) {
         for (k, lane) in (0..self.quads.len()).flat_map(|k| (0..4).map(move |lane| (k, lane))) {
             if self.quads[k].mass.lane(lane) > 0.0 {
                 continue;

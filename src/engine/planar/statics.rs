@@ -1,9 +1,9 @@
 //! Equilibrium without time stepping.
 //!
-//! The energy Σ k (θ − θ_V)²/2 + Σ m g z, with the corners above the floor, is lowered by Newton steps that leave out how gravity's and the
-//! floor's lever arms change: then a step is the same O(n) problem as a step in time, with displacements for velocities, k for the
-//! implicit terms and a frictionless floor. What is left out is small beside k, so the steps shrink by a constant factor. Without
-//! friction the equilibrium of a robot on the floor does not depend on how it got there; the centre of mass keeps its x.
+//! Newton steps minimise the energy Σ k (θ − θ_V)²/2 + Σ m g z with the corners above the floor. They leave out how the lever arms of gravity and floor
+//! change, so a step is the same O(n) problem as a step in time, with displacements for velocities, k for the implicit terms and a frictionless floor. What is
+//! left out is small beside k, so the steps converge linearly. Without friction the equilibrium on the floor does not depend on how it is reached; the
+//! centre of mass keeps its x.
 
 use fearless_simd::{Simd, dispatch, prelude::*};
 use wide::f64x2;
@@ -15,13 +15,13 @@ use super::quad::{Quad, direction};
 use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
-/// Rigid motions that cost no energy are held by this share of the inertia (1/s²).
+/// Fraction of the inertia (1/s²) that regularises rigid motions without energy.
 const HOLD: f64 = 0.1;
-/// Give of the floor under the whole weight (cm).
+/// Compression of the floor under the whole weight (cm).
 const GIVE: f64 = 1e-7;
-/// Largest turn of a body in a step (rad), so that the arms stay what they were.
+/// Largest turn of a body in a step (rad), so that lever arms change little.
 const LARGEST_TURN: f64 = 0.2;
-/// The last step turns no body by more than this (rad).
+/// A step that turns no body by more than this (rad) is the last.
 const SETTLED: f64 = 1e-13;
 const LARGEST_STEPS: u32 = 2000;
 
@@ -77,8 +77,8 @@ impl PlanarEngine {
                 quad.load([zero, mass * self.gravity_vector[0], mass * self.gravity_vector[1]]);
                 let (inner, last) = inner(quad.angle.on(simd), before);
                 quad.load_torque(-1.0, inner);
-                if let Some(beyond) = &self.extensions {
-                    quad.torque += beyond.at_rest(k, quad, quad.angle - inner.into() - quad.rest_angle);
+                if let Some(extensions) = &self.extensions {
+                    quad.torque += extensions.at_rest(k, quad, quad.angle - inner.into() - quad.rest_angle);
                 }
                 before = last;
             }

@@ -9,11 +9,11 @@ use super::recursion::BaseJoint;
 use super::{EngineError, LARGEST_COORDINATE, PlanarEngine};
 use crate::actuator::PiezoJoint;
 
-/// The links' directions are computed anew every so many steps: turning them on loses a unit in the last place at times.
+/// The links' directions are computed anew after this many steps: each turn may lose a unit in the last place.
 pub(super) const EXACT_EVERY: u64 = 256;
 
 impl PlanarEngine {
-    /// A step, in registers of this machine.
+    /// One step, cut where corners land.
     #[inline(always)]
     pub(super) fn advance_here<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
         self.begin_step(simd);
@@ -27,15 +27,15 @@ impl PlanarEngine {
         Ok(())
     }
 
-    /// Turns the links to where they are in the middle of the step if all goes on at its rates, and loads there what is known of the step's
-    /// right side: momenta, gravity, drag and the joints' torques. Finds the corners that may touch.
+    /// Turns the links to the middle of the step at the present rates, sets the step's right side there (momenta, gravity, drag, joint torques), and finds the
+    /// contact candidates.
     #[inline(always)]
     pub(super) fn begin_step<S: Simd>(&mut self, simd: S) {
         let share = self.weight * self.time_step;
         let ahead = Four::splat(simd, 0.5 * self.time_step);
         let exact = self.step.is_multiple_of(EXACT_EVERY);
         let [pull_x, pull_z] = self.gravity_vector.map(|part| share * part);
-        let drag = self.extensions.as_ref().filter(|beyond| beyond.has_drag());
+        let drag = self.extensions.as_ref().filter(|extensions| extensions.has_drag());
         let mut before = Two::splat(simd, 0.0);
         for quad in &mut self.quads {
             let (angle, mass) = (quad.angle.on(simd), quad.mass.on(simd));
@@ -45,8 +45,8 @@ impl PlanarEngine {
             quad.load_torque(-share, inner);
             before = last;
             let mut momentum = [quad.inertia.on(simd) * rate, mass * (x + pull_x), mass * (z + pull_z)];
-            if let Some(beyond) = drag {
-                let drag = beyond.drag(quad);
+            if let Some(extensions) = drag {
+                let drag = extensions.drag(quad);
                 (0..3).for_each(|k| momentum[k] += drag[k].on(simd) * share);
             }
             quad.load(momentum);
@@ -59,17 +59,17 @@ impl PlanarEngine {
         self.find_corners(simd, &law);
     }
 
-    /// Solves the step's mean motion, again and again where joints rub.
+    /// Solves for the step's mean motion; repeatedly where joints have dry friction.
     #[inline(always)]
     pub(super) fn solve_step<S: Simd>(&mut self, simd: S, share: f64) -> Result<(), EngineError> {
         let law = self.law;
-        let Some(mut beyond) = self.extensions.take() else { return self.solve_on_floor(simd, &law) };
-        beyond.begin(&self.quads);
+        let Some(mut extensions) = self.extensions.take() else { return self.solve_on_floor(simd, &law) };
+        extensions.begin(&self.quads);
         let mut result = Ok(());
         for repetition in 1..=LARGEST_REPETITIONS {
-            beyond.load(&mut self.quads, share);
+            extensions.load(&mut self.quads, share);
             result = self.solve_on_floor(simd, &law);
-            if result.is_err() || beyond.accept(&self.quads) || !beyond.is_repeated() {
+            if result.is_err() || extensions.accept(&self.quads) || !extensions.is_repeated() {
                 break;
             }
             if repetition == LARGEST_REPETITIONS {
@@ -77,12 +77,12 @@ impl PlanarEngine {
                 result = Err(EngineError::NotConverged { iterations: repetition, step: self.step, time });
             }
         }
-        beyond.end();
-        self.extensions = Some(beyond);
+        extensions.end();
+        self.extensions = Some(extensions);
         result
     }
 
-    /// Solves the step that was begun and takes it.
+    /// Solves the step that was begun, and updates the state.
     #[inline(always)]
     pub(super) fn end_step<S: Simd>(&mut self, simd: S) -> Result<(), EngineError> {
         let h = self.time_step;
@@ -125,8 +125,7 @@ impl PlanarEngine {
         Ok(())
     }
 
-    /// Where the root's reference point is (cm), as the links are turned, its velocity (cm/s), from the rates and the velocity of the centre of mass,
-    /// and its acceleration (cm/s²) if these stay.
+    /// Position (cm), velocity (cm/s) and acceleration at constant rates (cm/s²) of the root's reference point, in the present pose of the links.
     #[inline(always)]
     pub(super) fn root_motion<S: Simd>(&self, simd: S) -> [[f64; 2]; 3] {
         if self.clamped() {
@@ -146,7 +145,7 @@ impl PlanarEngine {
         [less(position, self.centre), less(velocity, self.velocity), acceleration.map(|part| Lanes::from(part).sum())]
     }
 
-    /// Height of a free robot's root (cm) in the middle of the step, as the links are turned, and its velocity and acceleration at the start.
+    /// Height of a free robot's root (cm) in the middle of the step, and its velocity and acceleration at the start.
     #[inline(always)]
     pub(super) fn root_over_floor<S: Simd>(&self, simd: S) -> (f64, [[f64; 2]; 2]) {
         let [[_, height], velocity, acceleration] = self.root_motion(simd);
@@ -154,12 +153,12 @@ impl PlanarEngine {
     }
 }
 
-/// Weight of a step's end, of a step of `time_step` (s) with numerical damping (1/s).
+/// Weight of a step's end, for a step (s) and numerical damping (1/s).
 pub(super) fn weight_of(damping: f64, time_step: f64) -> f64 {
     (0.5 + damping * time_step).min(1.0)
 }
 
-/// Sets what springs and dampers add to the joints' inertia in a step of `time_step` (s).
+/// Sets what springs and dampers add to the joints' articulated inertia in a step of `time_step` (s).
 pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: BaseJoint, weight: f64, time_step: f64) {
     let implicit = Lanes::splat(weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step));
     for quad in quads.iter_mut() {
