@@ -1,22 +1,21 @@
-//! Steps that adapt to the motion, so that the error of each one stays below a tolerance.
+//! Adaptive steps, each with a local error below a tolerance.
 //!
-//! A step is taken in two halves of length h. Taken whole it would end elsewhere: where nothing happens by h³/2 (x⃛ + 12 D ẍ), with the places x of the nodes and the
-//! numerical damping D. The largest such distance is its local error, and the next step is as long as the error says, up to 1 ms. Derivatives are those of the
-//! mean velocities over both halves and over the half step before. Velocities at single times would not do: those that springs and dampers dictate may
-//! alternate. Where the half step before says nothing, after an impact and where voltages jump, the step is taken whole, too.
+//! A step is taken in two halves of length h. Its local error is the distance to where the whole step would end, h³/2 (x⃛ + 12 D ẍ) in smooth motion, with the
+//! nodes' positions x and the numerical damping D; the largest over the nodes sets the length of the next step, up to 1 ms. The derivatives come from mean
+//! velocities over both halves and the half step before, for velocities at single times may alternate. After an impact and where voltages jump the half
+//! step before is of no use, so the step is also taken whole.
 //!
-//! The error of a corner that lands within a step is its velocity times h. So steps end where the next corner lands: the landing is foreseen from
-//! heights and velocities, again and again as it comes nearer, and then one very short step, twice as long as what is left, takes the impact at once
-//! (Moreau's law) and ends exactly on the floor. Where other corners touch, an impact in two stages would have another result, and nothing may be left
-//! below the floor: what pushes a corner out interrupts its contact, which on films of high friction has been seen to decide where a robot goes.
-//! Landings too slow to matter within a step are left to it, as are corners that begin to slide, stick or leave: their accelerations jump, which costs
-//! an error of second order that the control sees.
+//! A landing within a step would cost an error of velocity times h. So steps end where the next corner lands: the landing is predicted from heights and
+//! velocities, repeatedly as it comes nearer, and one very short step, twice as long as the time left, takes the whole impact (Moreau's law) and ends exactly on
+//! the floor. Where other corners touch, an impact in two stages would have another result; and a penetration left over would be pushed out, which interrupts
+//! contact. Landings too slow to matter stay within a step, as do corners that begin to slide, stick or leave: their accelerations jump, an error of
+//! second order that the control sees.
 //!
-//! Events may accumulate, as when a body rocks to rest. Each is slower than the one before, and those that would move nothing by the tolerance
-//! are not resolved; nor is what happens within 10⁻⁸ s.
+//! Events may accumulate, as when a body rocks to rest. Each is slower than the one before; those that move nothing by the tolerance are not resolved, nor is
+//! anything within 10⁻⁸ s.
 //!
-//! Steps also end where voltages jump and where a run can be stopped. Records lie within steps: each is taken from a shorter step aside, so that they
-//! change nothing.
+//! Steps also end where voltages jump and where a run can be stopped. Records lie within steps: each is taken from a shorter step on a copy of the state, so
+//! that they change nothing.
 //!
 //! E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I* (1993), II.4 (step size control); V. Acary, B. Brogliato,
 //! *Numerical Methods for Nonsmooth Dynamical Systems* (2008), chapter 8 (event-driven schemes and accumulations).
@@ -30,26 +29,25 @@ use crate::model::Mount;
 pub(super) const LONGEST: f64 = 1e-3;
 /// Longest steps between two calls of the observer, which may stop a run.
 const OBSERVE_EVERY: u64 = 16;
-/// What happens within this time (s) happens at once: steps are not cut below it, but for those of an impact.
+/// Shortest step (s), except for impacts; events within it are simultaneous.
 const SHORTEST: f64 = 1e-8;
 /// The shortest half of an impact's step (s).
 const SHORTEST_IMPACT: f64 = 1e-10;
-/// What rounding leaves of a stretch of time (s), after thousands of steps.
+/// Rounding of a time (s) after thousands of steps.
 const SLIVER: f64 = 1e-10;
-/// Impacts that follow on each other at once; those after are left to ordinary steps.
+/// Impacts in direct succession; later ones are left to ordinary steps.
 const MOST_IMPACTS: u32 = 200;
-/// Steps to a landing that are shorter than this share of what the error allows are not controlled: their errors are of the order of its cube.
+/// Steps to a landing below this fraction of the allowed length are not controlled: their errors are of the order of its cube.
 const SHORT: f64 = 0.1;
-/// Share that is taken of the step that the error allows.
+/// Safety factor on the length that the error allows.
 const SAFETY: f64 = 0.9;
 /// Least and largest factor from one step to the next.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 4.0;
-/// Share of the step before an impact or a jump of voltages that is tried after it. Measured: with a half 4 %, with a fifth or a tenth 7 % fewer steps are solved in
-/// all than with the whole.
+/// Fraction of the last length that is tried after an impact or a jump of voltages.
 const ANEW: f64 = 0.2;
 
-/// How many steps a run took, halves and rejected ones included, and the shortest and longest that were kept (s).
+/// Number of steps of a run, halves and rejected ones included, and the shortest and longest step accepted (s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct StepCount {
     pub taken: u64,
@@ -57,7 +55,7 @@ pub(super) struct StepCount {
     pub longest: f64,
 }
 
-/// Why a run has no end.
+/// Why a run stopped early.
 pub(super) enum Stopped {
     Failed(EngineError),
     /// It would have taken more steps than allowed.
@@ -119,8 +117,7 @@ pub(super) fn run(
     Ok((run.observation.finish(engine, done, interrupted), run.count))
 }
 
-/// Places of the nodes in the middle of the step before, at a step's start, at its middle and end if it is taken in two halves, and at its end if it is taken
-/// whole.
+/// Indices of the nodes' positions: middle of the step before, start, middle and end of the step in two halves, and end of the whole step.
 const BEFORE: usize = 0;
 const START: usize = 1;
 const MIDDLE: usize = 2;
@@ -133,36 +130,36 @@ struct AdaptiveRun<'a> {
     /// Steps that may be taken.
     most: u64,
     count: StepCount,
-    /// Impacts that have followed on each other at once.
+    /// Impacts in direct succession so far.
     impacts: u32,
-    /// How long the next step may be (s), as far as errors say.
+    /// Length of the next step that the error allows (s).
     wanted: f64,
-    /// Half of the step before (s), if accelerations go on from it.
+    /// Half of the step before (s), if accelerations are continuous from there.
     half_before: Option<f64>,
-    /// Weight of a step's end less ½, per length of the step (1/s).
+    /// D, the engine's numerical damping (1/s).
     damping: f64,
     observation: Observation<'a>,
     supply: Supply<'a>,
-    /// In steps of the experiment: how far regular samples are apart and the next one; the next that may be recorded.
+    /// In multiples of the record grid: spacing of regular samples, the next sample, and the next possible record.
     every: u64,
     next_sample: u64,
     next_record: u64,
     nodes: [Vec<[f64; 2]>; 5],
-    /// Of the engine at a step's start, and at its end.
+    /// The engine at a step's start and at its end.
     checkpoints: [Vec<f64>; 2],
 }
 
-/// A stretch of time (s) that a step or a part of one covers.
+/// The interval of time (s) of a step or a part of one.
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
     from: f64,
     length: f64,
-    /// Whether it ends where a corner lands, which it must reach freely.
+    /// True if it ends where a corner lands, which contact must not stop before.
     lands: bool,
 }
 
 impl AdaptiveRun<'_> {
-    /// Takes in the state that the run begins with.
+    /// Samples and records the initial state.
     fn begin(&mut self, engine: &mut dyn Engine, step: u64) -> Result<(), EngineError> {
         let time = step as f64 * self.experiment.time_step;
         engine.places(&mut self.nodes[START])?;
@@ -179,7 +176,7 @@ impl AdaptiveRun<'_> {
         engine.rewind(&self.checkpoints[0])
     }
 
-    /// From `time` to `end` (s).
+    /// Steps from `time` to `end` (s).
     fn advance(&mut self, engine: &mut dyn Engine, mut time: f64, end: f64) -> Result<(), Stopped> {
         while time < end {
             let jump = self.experiment.drive.next_jump(time + SHORTEST);
@@ -193,12 +190,12 @@ impl AdaptiveRun<'_> {
                 continue;
             }
             let wanted = self.wanted;
-            // No sliver is left over.
+            // Two equal steps instead of a long and a tiny one.
             let length = if wanted < left && left < 1.5 * wanted { 0.5 * left } else { wanted.min(left) };
             let landing = engine.landing(self.tolerance / length);
             if landing <= SHORTEST && landing < left && self.impacts < MOST_IMPACTS {
                 self.impacts += 1;
-                // The landing is in the middle, and what lands stops.
+                // With the landing in the middle, the corner ends on the floor.
                 let length = 2.0 * landing.max(SHORTEST_IMPACT).min(0.5 * left);
                 self.take_at_once(engine, Stretch { from: time, length, lands: false })?;
                 self.begin_anew();
@@ -209,7 +206,7 @@ impl AdaptiveRun<'_> {
                 self.impacts = 0;
             }
             let lands = landing > SHORTEST && landing < length;
-            // What is left until the landing is half of an impact's step.
+            // The time left until the landing is half of the impact's step.
             let stretch = Stretch { from: time, length: if lands { landing - 0.5 * SHORTEST } else { length }, lands };
             if lands && stretch.length < SHORT * wanted {
                 self.take_at_once(engine, stretch)?;
@@ -217,7 +214,7 @@ impl AdaptiveRun<'_> {
                 continue;
             }
             let (taken, next) = self.take_step(engine, stretch)?;
-            // A step that was short for another reason says nothing against longer ones.
+            // A step that was short for another reason does not shorten the next ones.
             let unhindered = taken == stretch.length && taken < wanted;
             self.wanted = if unhindered { next.max(wanted) } else { next }.min(LONGEST);
             time = if !lands && taken == left { until } else { time + taken };
@@ -228,14 +225,14 @@ impl AdaptiveRun<'_> {
         Ok(())
     }
 
-    /// After what makes accelerations jump.
+    /// Accelerations have jumped: shortens the next step, which is to be taken whole as well.
     fn begin_anew(&mut self) {
         if self.half_before.take().is_some() {
             self.wanted *= ANEW;
         }
     }
 
-    /// Takes a step in one piece, whatever its error.
+    /// Takes a step in one piece, without error control.
     fn take_at_once(&mut self, engine: &mut dyn Engine, stretch: Stretch) -> Result<(), Stopped> {
         self.keep_start(engine)?;
         self.advance_by(engine, stretch)?;
@@ -251,7 +248,7 @@ impl AdaptiveRun<'_> {
         Ok(())
     }
 
-    /// Takes a step of that stretch or a shorter one; returns its length and that of the next one.
+    /// Takes a step over `stretch` or a shorter one; returns its length and that of the next one (s).
     fn take_step(&mut self, engine: &mut dyn Engine, mut stretch: Stretch) -> Result<(f64, f64), Stopped> {
         self.keep_start(engine)?;
         loop {
@@ -279,7 +276,7 @@ impl AdaptiveRun<'_> {
         engine.checkpoint(&mut self.checkpoints[0])
     }
 
-    /// Takes a step in halves; returns how far from there it would end if it were taken whole (cm).
+    /// Takes a step in halves; returns its local error (cm).
     fn try_step(&mut self, engine: &mut dyn Engine, stretch: Stretch) -> Result<f64, Stopped> {
         if self.half_before.is_none() {
             self.advance_by(engine, stretch)?;
@@ -296,7 +293,7 @@ impl AdaptiveRun<'_> {
             None => largest(whole.iter().zip(end).map(|(a, b)| a - b)),
             Some(length) => {
                 let h = half.length;
-                // Between the middle of the step and halfway between the centres of the half before and of the first half.
+                // Time between the two second differences.
                 let apart = 0.25 * (3.0 * h + length);
                 let (per_half, per_before, per_mean, per_apart) = (1.0 / h, 1.0 / length, 2.0 / (h + length), 1.0 / apart);
                 let places = before.iter().zip(start).zip(middle.iter().zip(end));
@@ -320,20 +317,20 @@ impl AdaptiveRun<'_> {
         self.advance_aside(engine, stretch)
     }
 
-    /// The same without counting the step.
+    /// [`advance_by`](Self::advance_by) without counting the step.
     fn advance_aside(&mut self, engine: &mut dyn Engine, Stretch { from, length, lands }: Stretch) -> Result<(), Stopped> {
         engine.set_time_step(length, Some(if lands { 0.0 } else { 0.5 * length }))?;
         self.supply.prepare_smooth(engine, from, from + length)?;
         Ok(engine.advance()?)
     }
 
-    /// Gives the engine the voltages of the time `time` (s).
+    /// Gives the engine the voltages at `time` (s).
     fn prepare_at(&mut self, engine: &mut dyn Engine, time: f64) -> Result<(), EngineError> {
         engine.set_time_step(SHORTEST, Some(SHORTEST))?;
         self.supply.prepare_smooth(engine, time, time + SHORTEST)
     }
 
-    /// Takes in what is to be seen after the start of a step that was just taken, until its end.
+    /// Samples, records and audits a step just taken, its start excluded.
     fn take_in(&mut self, engine: &mut dyn Engine, stretch: Stretch) -> Result<(), Stopped> {
         let end = stretch.from + stretch.length;
         let regular = self.sample(engine, stretch);
