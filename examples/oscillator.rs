@@ -8,6 +8,7 @@
 
 use std::f64::consts::PI;
 
+use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::diagnosis::Verdict;
 use sfers::diagnose::pipeline::diagnose;
 use sfers::diagnose::plant::{Candidate, Free, Model, Plant, Signal};
@@ -110,7 +111,7 @@ impl Plant for Oscillator {
         &self.candidates
     }
 
-    fn predict(&self, model: &Model, run: usize, _unknowns: &[f64]) -> Result<Vec<f64>, String> {
+    fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
         let value = |id: &str, nominal: f64| {
             model.terms.iter().find(|term| self.candidates[term.candidate].id == id).map_or(nominal, |term| term.x[0])
         };
@@ -136,7 +137,7 @@ impl Plant for Oscillator {
     }
 }
 
-fn main() -> Result<(), String> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let outcome = diagnose(&Oscillator::new(), "oscillator", &[], Vec::new(), &|_| {}, &|_| None)?;
     let d = &outcome.diagnosis;
     println!("{}", d.summary);
@@ -145,7 +146,7 @@ fn main() -> Result<(), String> {
         d.baseline.rmse_heldout_mm, d.calibrated.rmse_heldout_mm, d.extended.rmse_heldout_mm
     );
     if d.verdict != Verdict::Named || d.effects[0].id != "hardening" {
-        return Err(format!("expected the hardening spring, found {:?}", d.effects));
+        return Err(format!("expected the hardening spring, found {:?}", d.effects).into());
     }
     Ok(())
 }

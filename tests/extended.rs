@@ -35,7 +35,7 @@ fn write(folder: &Path, mount: &str, m: usize) {
 }
 
 /// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.
-fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) -> Result<f64, String> {
+fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) -> Result<f64, Box<dyn std::error::Error>> {
     let nuisances = vec![0.4; plant.nuisances(0)];
     let predicted = plant.predict(model, 0, &nuisances)?;
     let (toml, drive) = extended::experiment(dataset, plant, model, 0, &nuisances);

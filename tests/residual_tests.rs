@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::plant::{Candidate, Model, Plant, Signal};
 use sfers::diagnose::residual_tests::residual_tests;
 use sfers::diagnose::search::Split;
@@ -34,7 +35,7 @@ impl Plant for Measured {
         &[]
     }
 
-    fn predict(&self, _model: &Model, _run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, String> {
+    fn predict(&self, _model: &Model, _run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
         Ok(Vec::new())
     }
 }

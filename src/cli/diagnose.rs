@@ -11,7 +11,7 @@ use super::output::{finish, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::diagnose::dataset::{DataError, Dataset};
 use crate::diagnose::diagnosis::Verdict;
-use crate::diagnose::{extended, observations, pipeline, protocols, quality, report, robot::RobotPlant};
+use crate::diagnose::{DiagnoseError, extended, observations, pipeline, protocols, quality, report, robot::RobotPlant};
 use crate::files::{FolderLock, Locking};
 
 /// Say what the simulation gets wrong beside measured data, name the cause, and measure what it gains on runs that no fit saw.
@@ -40,6 +40,12 @@ impl From<DataError> for Failure {
             DataError::Description(error) => error.into(),
             other => Self::Data(other.to_string()),
         }
+    }
+}
+
+impl From<DiagnoseError> for Failure {
+    fn from(error: DiagnoseError) -> Self {
+        Self::Simulation(error.to_string())
     }
 }
 
@@ -112,7 +118,7 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
     let start = Instant::now();
     let progress = |what: &str| bar.set_message(what.to_owned());
     let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
-    let result = pool.install(|| {
+    let result = pool.install(|| -> Result<_, DiagnoseError> {
         if dataset.runs.is_empty() {
             let found = observations::diagnose(dataset, &progress)?;
             let page = observations::page(&found, dataset, &command);
@@ -129,7 +135,7 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
         Ok((outcome.diagnosis, Some(files), page))
     });
     bar.finish_and_clear();
-    let (diagnosis, files, page) = result.map_err(Failure::Simulation)?;
+    let (diagnosis, files, page) = result?;
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(&args.out, &error))?;
     let printed = if options.json {
         print(&format!("{json}\n"))

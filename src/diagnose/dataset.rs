@@ -8,31 +8,25 @@ use serde::Deserialize;
 use thiserror::Error;
 use toml::de::{DeTable, DeValue};
 
-use super::observations::Fault;
-use super::{observations, robot, voltage};
+use super::observations::ObservationError;
+use super::{observations, robot, run_csv, voltage};
 use crate::analytic;
-
 use crate::experiment::{
     Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig, Source, StepConfig, experiment, presets,
 };
 use crate::model::{Mount, Robot};
 use crate::words;
 
-/// Most time steps of a run: one prediction takes some seconds then, and a diagnosis needs hundreds.
-const MOST_STEPS: f64 = 2e7;
-/// Beyond these a column has another unit: MFC actuators take 1.5 kV, and no robot is a hundred metres long.
-const MOST_SECONDS: f64 = 1e7;
-const MOST_VOLTS: f64 = 1e4;
-const MOST_MM: f64 = 1e5;
-/// Jumps of the voltage between rows are given this width.
-const LEAST_SECONDS: f64 = 1e-8;
+/// Most time steps of a run: a prediction then takes some seconds, and a diagnosis needs hundreds.
+pub(super) const MOST_STEPS: f64 = 2e7;
+/// Range of a standard deviation (mm).
 const NOISE_MM: RangeInclusive<f64> = 1e-9..=1e5;
 
 /// Data that cannot be used as they are.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DataError {
-    /// The description is not valid; the message shows line, column and key.
+    /// The description is not valid: the message has line, column and key.
     #[error(transparent)]
     Description(#[from] ConfigError),
     /// A file cannot be read.
@@ -52,12 +46,12 @@ pub enum DataError {
         line: u64,
         /// Column, from 1; 0 for a whole line.
         column: usize,
-        /// What is wrong, and what to try.
+        /// What is wrong, with a remedy.
         reason: String,
     },
 }
 
-/// A data set's description, as written.
+/// A data set's description, with the keys of the file.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct Description {
@@ -86,7 +80,7 @@ pub(crate) struct RunEntry {
     role: Role,
 }
 
-/// A single measured number, with what it was measured under.
+/// A single measured number and the conditions of its measurement.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observation {
@@ -94,9 +88,9 @@ pub struct Observation {
     pub measure: String,
     /// The measured value, in the measure's unit.
     pub value: f64,
-    /// One standard deviation.
+    /// Standard deviation, in the measure's unit.
     pub sigma: f64,
-    /// What it was measured under.
+    /// The drive.
     pub drive: DriveConfig,
     /// Overrides of the robot.
     #[serde(default)]
@@ -109,23 +103,23 @@ pub struct Observation {
     pub simulation: SimulationConfig,
 }
 
-/// What a run is for.
+/// The part of a run in the analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// The program decides.
+    /// Chosen by [`split`](super::search::split).
     #[default]
     Auto,
     /// Parameters are fitted to it.
     Fit,
-    /// Models are judged by it.
+    /// Models are judged on it.
     HeldOut,
 }
 
-/// A tracked point.
+/// A tracked point of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {
-    /// Its name in the columns.
+    /// Its name in the column headers.
     pub name: String,
     /// Distance from the left end along the robot (cm).
     pub position: f64,
@@ -138,15 +132,15 @@ pub struct MeasuredRun {
     pub id: String,
     /// Its file.
     pub path: PathBuf,
-    /// What it is for.
+    /// Its role.
     pub role: Role,
     /// Times (s).
     pub times: Vec<f64>,
-    /// Voltages (V), row after row, one per actuator.
+    /// Voltages (V), rows × actuators.
     pub voltages: Vec<f64>,
-    /// Per channel, a value (mm) per time. Channels are x and z of every marker, in order; a channel that was not measured is empty.
+    /// Positions (mm), channels × rows. Channels are x and z of every marker, in order; one that was not measured is empty.
     pub channels: Vec<Vec<f64>>,
-    /// What was noticed while reading, in words.
+    /// Remarks on the data, in words.
     pub remarks: Vec<String>,
 }
 
@@ -155,31 +149,31 @@ pub struct MeasuredRun {
 pub struct Dataset {
     /// Its name.
     pub name: String,
-    /// A few words on it.
+    /// Its description.
     pub about: String,
-    /// The nominal experiment without drive: material and robot, as written.
+    /// The nominal experiment without drive: material and robot, as in the file.
     pub nominal: Config,
     /// The nominal robot.
     pub robot: Robot,
-    /// The tracked points.
+    /// The tracked points, from left to right.
     pub markers: Vec<Marker>,
-    /// One standard deviation per channel (mm), where it is given.
+    /// Standard deviation of each channel (mm), if given.
     pub noise: Vec<Option<f64>>,
     /// The runs.
     pub runs: Vec<MeasuredRun>,
-    /// Single numbers.
+    /// Single measured numbers, in place of runs.
     pub observations: Vec<Observation>,
 }
 
-const AXES: [&str; 2] = ["x", "z"];
+pub(super) const AXES: [&str; 2] = ["x", "z"];
 
 impl Dataset {
-    /// Names of the channels, as in the files without unit.
+    /// Names of the channels: `NAME_x` and `NAME_z` of every marker.
     pub fn channel_names(&self) -> Vec<String> {
         self.markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}", marker.name))).collect()
     }
 
-    /// Reads a description, a file (`dataset.toml` of a folder) or `preset:NAME`, and its runs.
+    /// Reads a description (a file, the folder of a `dataset.toml`, or `preset:NAME`) and its runs.
     ///
     /// # Errors
     /// [`DataError`] with file, line and column.
@@ -197,9 +191,9 @@ impl Dataset {
             message: words::toml_error(&error),
         })?;
         let wrong =
-            |way: &[Part], reason: String| DataError::Content { path: path.into(), line: line_of(&text, way), column: 0, reason };
+            |key: &[Part], reason: String| DataError::Content { path: path.into(), line: line_of(&text, key), column: 0, reason };
         if let (false, [_, ..]) = (description.run.is_empty(), &description.observation[..]) {
-            return Err(fault(
+            return Err(value_error(
                 path,
                 &text,
                 &[Part::Key("observation"), Part::Index(0)],
@@ -274,7 +268,7 @@ impl Dataset {
                 return Err(wrong(&at("id"), format!("id: two runs are called {:?}", entry.id)));
             }
             let file = path.parent().unwrap_or(Path::new("")).join(&entry.file);
-            let (times, voltages, channels, remarks) = read_run(&file, &robot, &markers)?;
+            let run_csv::Rows { times, voltages, channels, remarks } = run_csv::read(&file, &robot, &markers)?;
             let run = MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks };
             runs.push(run.checked(&robot)?);
         }
@@ -284,12 +278,12 @@ impl Dataset {
                 *file = path.parent().unwrap_or(Path::new("")).join(&*file);
             }
             observations::check(&nominal, observation).map_err(|error| match error {
-                Fault::At { key, message } => {
-                    let way: Vec<Part> =
+                ObservationError::Value { key, message } => {
+                    let parts: Vec<Part> =
                         [Part::Key("observation"), Part::Index(index)].into_iter().chain(key.split('.').map(Part::Key)).collect();
-                    fault(path, &text, &way, &format!("observation {}: {key}", index + 1), message)
+                    value_error(path, &text, &parts, &format!("observation {}: {key}", index + 1), message)
                 }
-                Fault::Other(error) => error.into(),
+                ObservationError::Other(error) => error.into(),
             })?;
         }
         let name = if description.dataset.name.is_empty() {
@@ -301,23 +295,23 @@ impl Dataset {
     }
 }
 
-/// A step on the way to a value in a description.
+/// A part of a key in a description.
 #[derive(Debug, Clone, Copy)]
 enum Part<'a> {
     Key(&'a str),
     Index(usize),
 }
 
-/// Line (from 1) of the deepest part of the way that the text has.
-fn line_of(text: &str, way: &[Part]) -> u64 {
+/// Line (from 1) of the deepest part of a key that the text contains.
+fn line_of(text: &str, key: &[Part]) -> u64 {
     let Ok(parsed) = DeTable::parse(text) else { return 1 };
     let mut at: Option<&DeValue> = None;
     let mut offset = 0;
     let first = parsed.get_ref();
-    for part in way {
+    for part in key {
         let next = match (part, at) {
-            (Part::Key(key), None) => first.iter().find(|(name, _)| name.get_ref().as_ref() == *key),
-            (Part::Key(key), Some(DeValue::Table(table))) => table.iter().find(|(name, _)| name.get_ref().as_ref() == *key),
+            (Part::Key(own), None) => first.iter().find(|(name, _)| name.get_ref().as_ref() == *own),
+            (Part::Key(own), Some(DeValue::Table(table))) => table.iter().find(|(name, _)| name.get_ref().as_ref() == *own),
             (Part::Index(index), Some(DeValue::Array(array))) => {
                 let Some(item) = array.get(*index) else { break };
                 (offset, at) = (item.span().start, Some(item.get_ref()));
@@ -331,14 +325,14 @@ fn line_of(text: &str, way: &[Part]) -> u64 {
     text[..offset].matches('\n').count() as u64 + 1
 }
 
-/// A value of a description that makes no sense: a usage error.
-fn fault(path: &Path, text: &str, way: &[Part], key: &str, message: impl Into<String>) -> DataError {
-    let place = format!("{}, line {}", path.display(), line_of(text, way));
+/// A wrong value of a description: a usage error.
+fn value_error(path: &Path, text: &str, parts: &[Part], key: &str, message: impl Into<String>) -> DataError {
+    let place = format!("{}, line {}", path.display(), line_of(text, parts));
     ConfigError::Value { place, key: key.into(), message: message.into() }.into()
 }
 
 impl MeasuredRun {
-    /// The run, if its rows make a run that can be simulated and its voltages are known between rows.
+    /// The run, if it is short enough to be simulated and its voltages are known between rows.
     fn checked(mut self, robot: &Robot) -> Result<Self, DataError> {
         let bad =
             |reason: String| DataError::Unreadable { path: self.path.clone(), reason: format!("run {}: {reason}", self.id) };
@@ -365,7 +359,7 @@ impl MeasuredRun {
     }
 }
 
-/// The robot of a description, by the way of an experiment at rest.
+/// The robot of a description, resolved as that of an experiment at rest.
 fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, ConfigError> {
     let actuators = nominal.robot.actuators.unwrap_or(5);
     let mut config = nominal.clone();
@@ -375,202 +369,12 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
         .map_err(|error| ConfigError::Syntax { source_name: path.display().to_string(), message: error.to_string() })?;
     experiment(&Source::from_text(path.display().to_string(), shown)).map(|experiment| experiment.robot).map_err(|error| {
         match error {
-            // The lines are those of the description, not of the experiment made of it.
+            // Lines of the description, not of the experiment made from it.
             ConfigError::Value { key, message, .. } => {
-                let way: Vec<Part> = key.split('.').map(Part::Key).collect();
-                ConfigError::Value { place: format!("{}, line {}", path.display(), line_of(text, &way)), key, message }
+                let parts: Vec<Part> = key.split('.').map(Part::Key).collect();
+                ConfigError::Value { place: format!("{}, line {}", path.display(), line_of(text, &parts)), key, message }
             }
             other => other,
         }
     })
-}
-
-type RunData = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>, Vec<String>);
-
-fn read_run(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<RunData, DataError> {
-    let bytes =
-        crate::files::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
-    parse_run(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage)).map_err(
-        |Wrong { line, column, reason }| match line {
-            0 => DataError::Unreadable { path: path.into(), reason },
-            _ => DataError::Content { path: path.into(), line, column, reason },
-        },
-    )
-}
-
-#[derive(Debug)]
-struct Wrong {
-    line: u64,
-    column: usize,
-    reason: String,
-}
-
-fn parse_run(
-    bytes: &[u8],
-    actuators: usize,
-    markers: &[Marker],
-    bears: impl Fn(f64) -> Result<(), String>,
-) -> Result<RunData, Wrong> {
-    let wrong = |line: u64, column: usize, reason: String| Wrong { line, column, reason };
-    if bytes.is_empty() {
-        return Err(wrong(0, 0, "is empty".into()));
-    }
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-    let headers = reader.headers().map_err(|error| wrong(1, 0, error.to_string()))?.clone();
-    let names: Vec<String> = markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}_mm", marker.name))).collect();
-    let mut time_column = None;
-    let mut volt_columns = vec![None; actuators];
-    let mut columns = vec![None; names.len()];
-    for (at, header) in headers.iter().enumerate() {
-        let voltage = header.strip_prefix('v').and_then(|rest| rest.strip_suffix("_v")).and_then(|n| n.parse::<usize>().ok());
-        let slot = if header == "t_s" {
-            &mut time_column
-        } else if let Some(n) = voltage {
-            let reason =
-                format!("there is a voltage {header}, but the robot has {actuators} actuators; is this a run of another robot?");
-            n.checked_sub(1).and_then(|n| volt_columns.get_mut(n)).ok_or_else(|| wrong(1, at + 1, reason))?
-        } else if let Some(n) = names.iter().position(|name| name == header) {
-            &mut columns[n]
-        } else {
-            let known = markers.iter().map(|marker| marker.name.as_str()).collect::<Vec<_>>().join(", ");
-            let reason =
-                format!("{header:?} is neither t_s, a voltage v1_v, ..., nor NAME_x_mm or NAME_z_mm of a marker ({known})");
-            return Err(wrong(1, at + 1, reason));
-        };
-        if slot.replace(at).is_some() {
-            return Err(wrong(1, at + 1, format!("a second column {header}")));
-        }
-    }
-    let time_column = time_column.ok_or_else(|| wrong(1, 0, "the column t_s is missing".into()))?;
-    let volt_columns: Vec<usize> = volt_columns
-        .into_iter()
-        .enumerate()
-        .map(|(i, column)| {
-            column.ok_or_else(|| wrong(1, 0, format!("the column v{}_v is missing; the robot has {actuators} actuators", i + 1)))
-        })
-        .collect::<Result<_, _>>()?;
-    if columns.iter().all(Option::is_none) {
-        return Err(wrong(1, 0, "there is no column of a marker".into()));
-    }
-
-    let (mut times, mut voltages): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-    let mut channels: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
-    for record in reader.records() {
-        let record = record.map_err(|error| {
-            let line = error.position().map_or(0, csv::Position::line);
-            wrong(line.max(1), 0, error.to_string())
-        })?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: usize| {
-            let text = record.get(column).unwrap_or_default();
-            let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| {
-                wrong(line, column + 1, format!("{}: {text:?} is not a number", headers.get(column).unwrap_or_default()))
-            })
-        };
-        let within = |column: usize, most: f64, unit: &str| {
-            let value = number(column)?;
-            if value.abs() <= most {
-                return Ok(value);
-            }
-            let name = headers.get(column).unwrap_or_default();
-            Err(wrong(line, column + 1, format!("{name} is {}, beyond {most:.0} {unit}; is it in {unit}?", words::number(value))))
-        };
-        let time = within(time_column, MOST_SECONDS, "s")?;
-        if times.last().is_some_and(|last| time - last < LEAST_SECONDS) {
-            let last = times[times.len() - 1];
-            return Err(wrong(
-                line,
-                time_column + 1,
-                format!(
-                    "t_s is {} after {}; times must rise, by {LEAST_SECONDS:e} s at least",
-                    words::number(time),
-                    words::number(last)
-                ),
-            ));
-        }
-        times.push(time);
-        for &column in &volt_columns {
-            let voltage = within(column, MOST_VOLTS, "V")?;
-            bears(voltage)
-                .map_err(|reason| wrong(line, column + 1, format!("{} {reason}", headers.get(column).unwrap_or_default())))?;
-            voltages.push(voltage);
-        }
-        for (channel, column) in channels.iter_mut().zip(&columns) {
-            if let Some(column) = *column {
-                let empty = record.get(column).unwrap_or_default().is_empty();
-                channel.push(if empty { f64::NAN } else { within(column, MOST_MM, "mm")? });
-            }
-        }
-    }
-    if times.is_empty() {
-        return Err(wrong(1, 0, "there are no rows below the header".into()));
-    }
-    if times.len() == 1 {
-        return Err(wrong(2, 0, "there is one row; a run needs two at least".into()));
-    }
-    if channels.iter().flatten().all(|value| value.is_nan()) {
-        return Err(wrong(2, 0, "all values of all markers are missing".into()));
-    }
-    let mut remarks = Vec::new();
-    let missing = channels.iter().flatten().filter(|value| value.is_nan()).count();
-    if missing > 0 {
-        remarks.push(format!("{missing} values are missing"));
-    }
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    if let (Some(&middle), Some(&largest)) = (steps.get(steps.len() / 2), steps.last())
-        && largest > 5.0 * middle
-    {
-        remarks.push(format!("the largest gap between rows is {largest:.4} s, the usual step {middle:.4} s"));
-    }
-    Ok((times, voltages, channels, remarks))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn markers() -> Vec<Marker> {
-        vec![Marker { name: "tip".into(), position: 10.0 }]
-    }
-
-    #[test]
-    fn columns_may_stand_in_any_order_and_cells_may_be_empty() {
-        let text = b"tip_z_mm, v1_v, t_s\n1.5, 10, 0\n, 20, 0.1\n";
-        let (times, voltages, channels, remarks) = parse_run(text, 1, &markers(), |_| Ok(())).unwrap();
-        assert_eq!((times, voltages), (vec![0.0, 0.1], vec![10.0, 20.0]));
-        assert!(channels[0].is_empty() && channels[1][0] == 1.5 && channels[1][1].is_nan());
-        assert_eq!(remarks.len(), 1);
-    }
-
-    #[test]
-    fn what_is_wrong_is_named_with_line_and_column() {
-        for (text, line, column, words) in [
-            ("", 0, 0, "is empty"),
-            ("t_s,v1_v,tip_z_mm\n", 1, 0, "no rows"),
-            ("t_s,tip_z_mm\n0,1\n", 1, 0, "v1_v is missing"),
-            ("t_s,v1_v,v2_v,tip_z_mm\n0,1,1,1\n", 1, 3, "another robot"),
-            ("t_s,v1_v,nose_z_mm\n0,1,1\n", 1, 3, "nose_z_mm"),
-            ("t_s,v1_v,tip_z_mm\n0,1,1\n0,1,1\n", 3, 1, "times must rise"),
-            ("t_s,v1_v,tip_z_mm\n0,1,one\n", 2, 3, "\"one\" is not a number"),
-            ("t_s,v1_v,tip_z_mm\n0,,1\n", 2, 2, "is not a number"),
-            ("t_s,v1_v,tip_z_mm\n0,1,\n1,1,\n", 2, 0, "all values"),
-            ("t_s,v1_v\n0,1\n", 1, 0, "no column of a marker"),
-            ("t_s,v1_v,tip_z_mm\n0,1\n", 2, 0, "fields"),
-        ] {
-            let error = parse_run(text.as_bytes(), 1, &markers(), |_| Ok(())).unwrap_err();
-            assert!(error.reason.contains(words) && (error.line, error.column) == (line, column), "{text:?}: {error:?}");
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn any_bytes_are_a_run_or_an_error_but_never_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), head in any::<bool>()) {
-            let mut text = if head { b"t_s,v1_v,tip_z_mm\n".to_vec() } else { Vec::new() };
-            text.extend(bytes);
-            let _ = parse_run(&text, 1, &markers(), |_| Ok(()));
-        }
-    }
 }

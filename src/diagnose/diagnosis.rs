@@ -1,21 +1,21 @@
-//! What a diagnosis says: the content of diagnosis.json, and its sentence.
+//! The result of a diagnosis: the content of diagnosis.json, and the verdict in a sentence.
 
 use serde::Serialize;
 
 use super::names;
 use super::residual_tests::ResidualTest;
 
-/// What the data say.
+/// Result of a diagnosis in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// The nominal model, finely enough discretised, explains the data to the noise.
+    /// The nominal model, with a fine enough discretisation, explains the data to the noise.
     None,
-    /// The causes are named.
+    /// The causes are identified.
     Named,
-    /// Two or more causes that these data cannot tell apart.
+    /// Some causes cannot be told apart by these data.
     Tied,
-    /// Structure is left that nothing in the library explains.
+    /// Structure is left that no cause in the library explains.
     Unexplained,
 }
 
@@ -24,32 +24,32 @@ pub enum Verdict {
 pub struct Estimate {
     /// Its name in `[[effect]]` tables.
     pub name: String,
-    /// The value.
+    /// The fitted or given value, in `unit`.
     pub value: f64,
-    /// Its unit.
+    /// Its unit; empty for dimensionless ones.
     pub unit: String,
-    /// The range that holds the true value in 95 % of cases; an end may be missing where the data say nothing.
+    /// 95 % confidence interval, in `unit`; an end is missing where it is unbounded.
     pub ci95: [Option<f64>; 2],
-    /// Whether it stands at the end of its range.
+    /// True if the value is at a bound of the fit.
     pub at_bound: bool,
 }
 
-/// A cause that the data ask for.
+/// An adopted cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adopted {
     /// Its name.
     pub id: String,
     /// Where it acts.
     pub kind: String,
-    /// What it is, in a sentence.
+    /// The cause in a sentence.
     pub cause: String,
-    /// Its numbers.
+    /// Its parameters.
     pub parameters: Vec<Estimate>,
-    /// Causes that would do as well.
+    /// Causes that the data cannot tell from it.
     pub tied_with: Vec<String>,
-    /// Share of the held-out squared error above the noise that it removes.
+    /// Share of the held-out χ² above the noise that it removes (0 to 1).
     pub gain_heldout: f64,
-    /// What is given of it: parameters that were not fitted.
+    /// Parameters that were given: name and value.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<(String, f64)>,
 }
@@ -61,101 +61,101 @@ pub struct RunError {
     pub id: String,
     /// `fit` or `held-out`.
     pub role: &'static str,
-    /// Root of the mean squared residual.
+    /// Root mean square residual (mm).
     pub rmse_mm: f64,
-    /// The same in multiples of the noise.
+    /// Root mean square residual (σ).
     pub rmse_sigma: f64,
 }
 
-/// A model beside the data.
+/// A model compared with the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stage {
-    /// Over all runs.
+    /// Root mean square residual of all runs (mm).
     pub rmse_mm: f64,
-    /// Over the held-out runs.
+    /// Root mean square residual of the held-out runs (mm).
     pub rmse_heldout_mm: f64,
-    /// The range of that, by leaving out held-out runs one at a time.
+    /// Its 95 % confidence interval (mm), by a jackknife over held-out runs.
     pub rmse_heldout_ci95_mm: [f64; 2],
-    /// Run by run.
+    /// Errors of each run.
     pub runs: Vec<RunError>,
-    /// What the residuals look like.
+    /// Residual tests.
     pub residual_tests: Vec<ResidualTest>,
-    /// Fitted numbers.
+    /// Fitted parameters.
     pub parameters: Vec<Estimate>,
 }
 
-/// How well a candidate does on top of re-tuned constants.
+/// A candidate on top of re-tuned constants.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ranked {
     /// The candidate.
     pub id: String,
-    /// Which form of it, for causes that have several.
+    /// Its form, for causes with several.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub form: String,
-    /// Error of the held-out runs with it.
+    /// Root mean square residual of the held-out runs with it (mm).
     pub rmse_heldout_mm: f64,
-    /// Change of Bayes's information criterion against re-tuned constants alone; negative is better.
+    /// Change of BIC against re-tuned constants alone; negative is better.
     pub delta_bic: f64,
 }
 
-/// Two constants that the data hardly tell apart.
+/// Two nearly collinear parameters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Correlation {
     /// The two, as cause and parameter.
     pub between: [String; 2],
-    /// Coefficient of correlation (–).
+    /// Correlation coefficient (–).
     pub coefficient: f64,
 }
 
-/// What was found.
+/// The result of a diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// Of this object.
+    /// Version of this schema.
     pub schema: u32,
-    /// The data's name.
+    /// Name of the data set.
     pub dataset: String,
-    /// In a word.
+    /// The verdict.
     pub verdict: Verdict,
-    /// In a sentence.
+    /// The verdict in a sentence.
     pub summary: String,
-    /// Every cause adopted, numerics and constants included.
+    /// All adopted causes, discretisation and constants included.
     pub effects: Vec<Adopted>,
-    /// Share of the squared error above the noise that is left of the refined nominal model's.
+    /// Share of the refined nominal model's χ² above the noise that is left (0 to 1).
     pub unexplained_fraction: f64,
-    /// What is left looks like this.
+    /// Description of the residuals that are left.
     pub unexplained: Vec<String>,
-    /// One standard deviation, the mean over channels.
+    /// Standard deviation of the noise (mm), averaged over all values.
     pub noise_mm: f64,
     /// The nominal model.
     pub baseline: Stage,
-    /// With re-tuned constants and refined discretisation.
+    /// The nominal model with re-tuned constants and refined discretisation.
     pub calibrated: Stage,
-    /// With all causes adopted.
+    /// The model with all adopted causes.
     pub extended: Stage,
     /// Candidates on top of re-tuned constants, best first.
     pub candidates: Vec<Ranked>,
-    /// Constants that hardly differ in what they do.
+    /// Nearly collinear parameters.
     pub correlations: Vec<Correlation>,
-    /// Ratio of the largest to the smallest eigenvalue of the scaled information of the extended model.
+    /// Condition number of the scaled information of the extended model.
     pub condition: f64,
-    /// What to measure to tell tied causes apart.
+    /// The next measurement, where causes are tied or data insufficient.
     pub next_experiment: Option<String>,
-    /// What was noticed about the data.
+    /// Remarks on the data.
     pub data_quality: Vec<String>,
-    /// What was noticed about the analysis.
+    /// Remarks on the analysis.
     pub remarks: Vec<String>,
 }
 
 /// Share of tests that noise alone fails.
 const FAILED_BY_CHANCE: f64 = 1e-3;
-/// More tests fail than chance explains if noise alone fails as many in less than this share of cases.
+/// Failures are beyond chance if noise alone causes as many in a smaller share of cases.
 const BEYOND_CHANCE: f64 = 1e-3;
 
-/// Which residual tests fail, in words, if more do than noise alone would.
+/// The failed residual tests in words, if they are more than chance explains.
 pub fn failing(tests: &[ResidualTest]) -> Option<String> {
     let failed: Vec<&ResidualTest> = tests.iter().filter(|test| !test.passed).collect();
     let (count, n) = (failed.len(), tests.len() as f64);
-    // The chance of fewer failures, from the binomial distribution.
+    // Probability of fewer failures, binomial.
     let mut term = (1.0 - FAILED_BY_CHANCE).powf(n);
     let mut fewer = 0.0;
     for k in 0..count {
@@ -178,12 +178,13 @@ pub fn failing(tests: &[ResidualTest]) -> Option<String> {
     Some(format!("{count} of {} residual tests still {verb}, more than chance explains ({})", tests.len(), list.join(", ")))
 }
 
-/// The verdict in a sentence. `failing` is what [`failing`] says of the extended model.
+/// The verdict in a sentence. `left` is the unexplained fraction, `insufficient` why the data are insufficient, `failing` the result of [`failing`]
+/// for the extended model.
 pub(super) fn summary(
     verdict: Verdict,
     effects: &[Adopted],
     left: f64,
-    poor: Option<&str>,
+    insufficient: Option<&str>,
     resolution: f64,
     refined: bool,
     failing: Option<&str>,
@@ -191,17 +192,17 @@ pub(super) fn summary(
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
     let name = |effect: &Adopted| {
-        let numbers: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();
-        format!("{} ({})", names::with_form(&effect.id, &names::form_of(effect)), numbers.join("; "))
+        let parameters: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();
+        format!("{} ({})", names::with_form(&effect.id, &names::form_of(effect)), parameters.join("; "))
     };
     let physics: Vec<&Adopted> = effects.iter().filter(|effect| effect.id != "discretisation").collect();
     let named = physics.iter().map(|effect| name(effect)).collect::<Vec<_>>().join("; ");
     match verdict {
-        Verdict::None => match (poor, failing) {
-            (Some(poor), _) => format!("Nothing stands out, but {poor}{}.", but.replacen(", but", ", and", 1)),
+        Verdict::None => match (insufficient, failing) {
+            (Some(insufficient), _) => format!("Nothing stands out, but {insufficient}{}.", but.replacen(", but", ", and", 1)),
             (None, None) => format!("Nothing is missing: the nominal model{finely} explains the data to the noise."),
             (None, Some(failing)) => format!(
-                "Nothing that the library knows is missing, and the nominal model{finely} leaves no more than the size of the noise, but {failing}."
+                "No cause in the library is needed: the nominal model{finely} leaves residuals of the size of the noise, but {failing}."
             ),
         },
         Verdict::Named => format!("The simulation lacks: {named}{but}."),
@@ -216,13 +217,16 @@ pub(super) fn summary(
                 .collect();
             format!("The simulation lacks: {named}; in these data {}{but}.", ties.join("; "))
         }
-        Verdict::Unexplained => match (poor, physics.is_empty()) {
-            (Some(poor), _) => {
-                format!("The nominal model does not explain the data, and {poor}{}.", but.replacen(", but", ", and", 1))
+        Verdict::Unexplained => match (insufficient, physics.is_empty()) {
+            (Some(insufficient), _) => {
+                format!("The nominal model does not explain the data, and {insufficient}{}.", but.replacen(", but", ", and", 1))
             }
-            (None, true) => format!("Something is wrong that nothing in the library explains{}.", but.replacen(", but", ":", 1)),
+            (None, true) => format!(
+                "The nominal model does not explain the data, and no cause in the library does{}.",
+                but.replacen(", but", ":", 1)
+            ),
             (None, false) => format!(
-                "{named} explains a part, but {:.0} % of the misfit is left that nothing in the library explains{}.",
+                "{named} explains a part, but {:.0} % of the misfit is left, which no cause in the library explains{}.",
                 100.0 * left,
                 but.replacen(", but", ", and", 1)
             ),
@@ -260,8 +264,8 @@ mod tests {
         let words = failing(&tests(80, 3)).unwrap();
         assert_eq!(words, "3 of 80 residual tests still fail, more than chance explains (drift in log time 2, loop area 1)");
         for verdict in [Verdict::None, Verdict::Named, Verdict::Tied, Verdict::Unexplained] {
-            for poor in [None, Some("one run is too little")] {
-                let first = |failing| summary(verdict, &[], 0.3, poor, 10.0, true, failing);
+            for insufficient in [None, Some("one run is too little")] {
+                let first = |failing| summary(verdict, &[], 0.3, insufficient, 10.0, true, failing);
                 assert!(first(Some(words.as_str())).split(". ").next().unwrap().contains(&words), "{verdict:?}");
                 assert!(!first(None).contains("residual tests"));
             }

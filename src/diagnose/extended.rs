@@ -1,53 +1,55 @@
-//! What a diagnosis leaves for going on: the extended model as an experiment, its drive, and all residuals.
+//! The extended model as an experiment file with its drive, and the residuals of all runs.
 //!
-//! The experiment takes the steps of the fit, so that `sfers run` gives what the fit predicted: at the rows of the run where they fall on steps,
-//! between recorded steps by the cubic through positions and velocities elsewhere.
+//! The experiment has the time steps of the fit, so that `sfers run` reproduces the prediction: rows that fall on steps are recorded, the others lie
+//! between recorded steps.
 
 use super::dataset::Dataset;
+use super::fit::sum_of_squares;
 use super::pipeline::Outcome;
 use super::plant::{Model, Plant};
-use super::robot::{NUMERICAL_DAMPING, ON_STEP, RobotPlant};
+use super::robot::RobotPlant;
+use super::track::{NUMERICAL_DAMPING, ON_STEP};
 use crate::effects::View;
 use crate::experiment::{DriveConfig, EffectConfig, SimulationConfig, StepConfig};
 use crate::model::Mount;
 
-/// Most numbers that a run of the experiment records (160 MB).
+/// Most numbers in a recording of the experiment (160 MB).
 const MOST_RECORDED: f64 = 2e7;
 
-/// The files' texts.
+/// The texts of the files.
 pub struct Files {
-    /// `extended.toml`: an experiment that `sfers run` takes.
+    /// `extended.toml`: an experiment for `sfers run`.
     pub experiment: String,
-    /// `drive.csv`: the voltages of its run, beside it.
+    /// `drive.csv`: the voltages of the experiment.
     pub drive: String,
-    /// `residuals.csv`.
+    /// `residuals.csv`: measured and predicted values of all runs.
     pub residuals: String,
 }
 
 impl Files {
-    /// The extended model under the drive of the run that the re-tuned nominal model explains worst.
+    /// The extended model under the drive of the run with the largest residuals of re-tuned constants.
     pub fn new(dataset: &Dataset, plant: &RobotPlant, outcome: &Outcome) -> Self {
-        let square = |run: &usize| outcome.calibrated.residuals[*run].iter().map(|r| r * r).sum::<f64>();
+        let chi2 = |run: &usize| sum_of_squares(&outcome.calibrated.residuals[*run]);
         let all = outcome.split.all();
-        let run = all.iter().copied().max_by(|a, b| square(a).total_cmp(&square(b))).unwrap_or(0);
+        let run = all.iter().copied().max_by(|a, b| chi2(a).total_cmp(&chi2(b))).unwrap_or(0);
         let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run]);
         Self { experiment, drive, residuals: residuals(plant, outcome) }
     }
 }
 
-/// A model as an experiment file under the drive of a run, with the file of that drive, `drive.csv`: its recording is what the model predicts.
+/// The experiment file (TOML) of a model under the drive of a run, and the file of that drive, `drive.csv`. `nuisances` (0 to 1) are the run's.
 pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usize, nuisances: &[f64]) -> (String, String) {
     let table = plant.command(run).table(nuisances);
     let n = plant.robot().actuators;
     let names = std::iter::once("t_s".to_owned()).chain((1..=n).map(|a| format!("v{a}_v"))).collect();
     let rows = table.times().iter().enumerate();
-    let drive = written(
+    let drive = csv_text(
         std::iter::once(names)
             .chain(rows.map(|(row, t)| std::iter::once(t).chain(table.row(row)).map(|x| format!("{x:?}")).collect())),
     );
 
     let mut config = dataset.nominal.clone();
-    // The drive's positive voltages have their gain already.
+    // The table's positive voltages include the gain.
     config.robot.positive_gain = None;
     config.drive = DriveConfig { waveform: Some("csv".into()), file: Some("drive.csv".into()), ..DriveConfig::default() };
     let mut effects = Vec::new();
@@ -64,7 +66,7 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
     }
     let step = plant.step(run) * if model.fine { 0.5 } else { 1.0 };
     let steps = plant.steps_of(run, step);
-    // What a camera sees late lies between records, so every step is one.
+    // A camera's delay needs positions between rows, so every step is recorded.
     let late = View::new(&effects).delay > 0.0;
     let every = if late { 1 } else { interval(&plant.signals()[run].times, step).unwrap_or(1) };
     let values = 10.0 * model.resolution * n as f64 + 13.0;
@@ -109,16 +111,16 @@ fn interval(times: &[f64], step: f64) -> Option<u64> {
 }
 
 /// Rows as CSV.
-fn written(rows: impl Iterator<Item = Vec<String>>) -> String {
+fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
     for row in rows {
-        // A vector in memory takes every row.
+        // Writing to a vector does not fail.
         let _ = table.write_record(&row);
     }
     String::from_utf8_lossy(&table.into_inner().unwrap_or_default()).into_owned()
 }
 
-/// Every measured value beside what the models say, in digits that bring back the same bits.
+/// All measured and predicted values, in digits that restore the same bits.
 fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
     let channels = plant.channels();
     let head = ["run", "role", "channel", "t_s", "measured_mm", "nominal_mm", "calibrated_mm", "extended_mm", "used"];
@@ -129,7 +131,7 @@ fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
         (0..signal.values.len()).map(move |i| {
             let used = outcome.used[run][i];
             let predicted = [&outcome.nominal, &outcome.calibrated, &outcome.extended].map(|scored| {
-                // Residuals of values left out are not kept.
+                // Masked values have no residuals.
                 let value = signal.values[i] - scored.residuals[run][i] * signal.sigmas[i];
                 if used { format!("{value:?}") } else { String::new() }
             });
@@ -138,5 +140,5 @@ fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
             named.into_iter().chain(numbers).chain(predicted).chain([u8::from(used).to_string()]).collect()
         })
     });
-    written(std::iter::once(head.map(str::to_owned).to_vec()).chain(rows))
+    csv_text(std::iter::once(head.map(str::to_owned).to_vec()).chain(rows))
 }

@@ -1,11 +1,11 @@
 //! Bounded least squares by Levenberg and Marquardt, with derivatives by finite differences, in parallel over parameters and runs.
 //!
 //! ```text
-//! χ² = Σ ((y − f(x))/σ)²        minimised over the coordinates x of all terms, within their bounds
+//! χ² = Σ ((y − f(x))/σ)²        minimised over the coordinates x of all terms within their bounds
 //! ```
 //!
-//! Moments of jumps between rows belong to a run, not to the model ([`Plant::nuisances`]); they are fitted run by run between rounds of the
-//! model's own parameters. Every sum runs in a fixed order, so results do not depend on the number of threads.
+//! The nuisance parameters of a run ([`Plant::nuisances`]), such as times of jumps between rows, are fitted run by run, in turn with the model's
+//! parameters. Every sum has a fixed order, so results do not depend on the number of threads.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,33 +13,35 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::DiagnoseError;
 use super::plant::{Model, Plant};
 
 /// Step of finite differences as a share of a parameter's scale.
 const DIFFERENCE: f64 = 0.02;
-/// A round ends when χ² falls by less than this share of the number of values, or by less than this share of itself.
-const ENOUGH: f64 = 1e-6;
-const ENOUGH_OF_ITSELF: f64 = 1e-4;
-const MOST_ROUNDS: usize = 25;
-/// Values in a block that structure of the residuals may extend over.
+/// A fit has converged when χ² falls by less than this share of the number of values, ...
+const TOLERANCE: f64 = 1e-6;
+/// ... or by less than this share of χ² above it: to the end, and to rank models.
+const RELATIVE_TOLERANCE: f64 = 1e-4;
+const RELATIVE_TOLERANCE_TO_RANK: f64 = 2e-2;
+/// Most iterations: to the end, and to rank models.
+const MOST_ITERATIONS: usize = 25;
+const MOST_ITERATIONS_TO_RANK: usize = 8;
+/// Values in a block over which residuals may be correlated.
 pub(super) const BLOCK: usize = 50;
-/// The same where models are only to be ranked.
-const ENOUGH_TO_RANK: f64 = 2e-2;
-const MOST_ROUNDS_TO_RANK: usize = 8;
 
-/// Values of predictions that are kept for the next time, twice: those used lately and those before them.
+/// Predicted values in each of the cache's two generations.
 const MOST_KEPT: usize = 2_000_000;
 
-/// How far a fit is carried.
+/// Convergence of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Care {
-    /// Far enough to see whether a model is worth more.
+pub enum Convergence {
+    /// Enough to rank models.
     Rank,
-    /// To the end.
+    /// Full.
     Full,
 }
 
-/// Nuisances of all runs.
+/// Nuisance parameters (0 to 1), runs × parameters.
 pub type Nuisances = Vec<Vec<f64>>;
 
 /// A fitted model.
@@ -51,45 +53,46 @@ pub struct Fit {
     pub chi2: f64,
     /// Number of values in them.
     pub count: usize,
-    /// JᵀJ of the coordinates, in units of 1/σ² = 1.
+    /// Information JᵀJ, coordinates × coordinates, of residuals in σ.
     pub information: DMatrix<f64>,
 }
 
-/// The loop's view of a plant: which values count, and what is taken for each run's nuisances.
-pub struct Bench<'a> {
+/// A plant with the mask of its values and the current nuisance parameters.
+pub struct Estimator<'a> {
     /// The plant.
     pub plant: &'a dyn Plant,
-    /// Moments of jumps and the like, as they are taken at present.
+    /// Current nuisance parameters.
     pub nuisances: Nuisances,
-    /// Which values of each run count.
+    /// True for the values that count, runs × values.
     pub used: Vec<Vec<bool>>,
     kept: Mutex<Kept>,
 }
 
-/// Predictions by what they were made from. Fits begin where others ended, so one in five is asked for again.
+/// Cache of predictions in two generations. Fits begin where others ended, so one prediction in five is repeated.
 #[derive(Default)]
 struct Kept {
-    lately: HashMap<Vec<u64>, Arc<Vec<f64>>>,
-    before: HashMap<Vec<u64>, Arc<Vec<f64>>>,
+    recent: HashMap<Vec<u64>, Arc<Vec<f64>>>,
+    older: HashMap<Vec<u64>, Arc<Vec<f64>>>,
+    /// Number of values in `recent`.
     values: usize,
 }
 
 impl Kept {
     fn get(&self, key: &[u64]) -> Option<Arc<Vec<f64>>> {
-        self.lately.get(key).or_else(|| self.before.get(key)).cloned()
+        self.recent.get(key).or_else(|| self.older.get(key)).cloned()
     }
 
     fn put(&mut self, key: Vec<u64>, predicted: &Arc<Vec<f64>>) {
         if self.values > MOST_KEPT {
-            self.before = std::mem::take(&mut self.lately);
+            self.older = std::mem::take(&mut self.recent);
             self.values = 0;
         }
         self.values += predicted.len();
-        self.lately.insert(key, predicted.clone());
+        self.recent.insert(key, predicted.clone());
     }
 }
 
-/// Everything that a prediction depends on.
+/// The bits of all that a prediction depends on.
 fn key(model: &Model, run: usize, nuisances: &[f64]) -> Vec<u64> {
     let terms = model.terms.iter().flat_map(|term| {
         let numbers = term.x.iter().map(|x| x.to_bits());
@@ -99,18 +102,18 @@ fn key(model: &Model, run: usize, nuisances: &[f64]) -> Vec<u64> {
     whole.into_iter().chain(terms).chain(nuisances.iter().map(|x| x.to_bits())).collect()
 }
 
-/// Residuals of one run in standard deviations.
+/// Residuals of a run, in σ; 0 for values that do not count.
 pub type Residuals = Vec<f64>;
 
-impl<'a> Bench<'a> {
-    /// A plant with its nuisances at the ends of their intervals: a command is held until the row that shows its change.
+impl<'a> Estimator<'a> {
+    /// A plant with all values, and nuisance parameters of 1: a command is held until the row that shows its change.
     pub fn new(plant: &'a dyn Plant) -> Self {
         let nuisances = (0..plant.signals().len()).map(|run| vec![1.0; plant.nuisances(run)]).collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
         Self { plant, nuisances, used, kept: Mutex::default() }
     }
 
-    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Arc<Vec<f64>>, String> {
+    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Arc<Vec<f64>>, DiagnoseError> {
         let key = key(model, run, nuisances);
         let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = kept().get(&key);
@@ -122,34 +125,43 @@ impl<'a> Bench<'a> {
         Ok(predicted)
     }
 
-    /// Residuals of a run.
-    pub fn residuals(&self, model: &Model, run: usize) -> Result<Residuals, String> {
+    /// Residuals of a run, in σ.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn residuals(&self, model: &Model, run: usize) -> Result<Residuals, DiagnoseError> {
         self.residuals_with(model, run, &self.nuisances[run])
     }
 
-    fn residuals_with(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Residuals, String> {
+    fn residuals_with(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Residuals, DiagnoseError> {
         let signal = &self.plant.signals()[run];
         let predicted = self.predict(model, run, nuisances)?;
         let each = signal.values.iter().zip(&*predicted).zip(&signal.sigmas).zip(&self.used[run]);
         Ok(each.map(|(((y, f), sigma), used)| if *used { (y - f) / sigma } else { 0.0 }).collect())
     }
 
-    /// Residuals of several runs.
-    pub fn residuals_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<Residuals>, String> {
+    /// Residuals of several runs, in σ.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn residuals_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<Residuals>, DiagnoseError> {
         runs.par_iter().map(|run| self.residuals(model, *run)).collect()
     }
 
     /// χ² of each of several runs.
-    pub fn chi2_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<f64>, String> {
-        Ok(self.residuals_of(model, runs)?.iter().map(|r| square(r)).collect())
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn chi2_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<f64>, DiagnoseError> {
+        Ok(self.residuals_of(model, runs)?.iter().map(|r| sum_of_squares(r)).collect())
     }
 
-    /// Number of values in runs.
+    /// Number of values that count in several runs.
     pub fn count(&self, runs: &[usize]) -> usize {
         runs.iter().map(|run| self.used[*run].iter().filter(|used| **used).count()).sum()
     }
 
-    /// The coordinate's step for a finite difference: away from the nearer bound.
+    /// The finite-difference step of a coordinate, within its bounds.
     pub(super) fn step(&self, model: &Model, (term, parameter): (usize, usize)) -> f64 {
         let free = &self.plant.candidates()[model.terms[term].candidate].parameters[parameter];
         let x = model.terms[term].x[parameter];
@@ -157,18 +169,18 @@ impl<'a> Bench<'a> {
         if x + step > free.bounds[1] { -step } else { step }
     }
 
-    /// Residuals and their derivatives by all coordinates, run by run.
-    fn linearised(&self, model: &Model, runs: &[usize]) -> Result<(Vec<Residuals>, Vec<Vec<Residuals>>), String> {
-        let places = places(model);
+    /// Residuals (runs × values) and their derivatives (coordinates × runs × values).
+    fn linearised(&self, model: &Model, runs: &[usize]) -> Result<(Vec<Residuals>, Vec<Vec<Residuals>>), DiagnoseError> {
+        let coordinates = coordinates(model);
         let tasks: Vec<(usize, usize)> =
-            (0..=places.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
+            (0..=coordinates.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
         let results: Vec<Residuals> = tasks
             .par_iter()
             .map(|(column, run)| {
                 let mut model = model.clone();
-                if let Some(place) = column.checked_sub(1).map(|at| places[at]) {
-                    let step = self.step(&model, place);
-                    model.terms[place.0].x[place.1] += step;
+                if let Some((term, parameter)) = column.checked_sub(1).map(|at| coordinates[at]) {
+                    let step = self.step(&model, (term, parameter));
+                    model.terms[term].x[parameter] += step;
                 }
                 self.residuals(&model, *run)
             })
@@ -176,9 +188,9 @@ impl<'a> Bench<'a> {
         let mut columns = results.chunks(runs.len()).map(<[Residuals]>::to_vec);
         let plain = columns.next().unwrap_or_default();
         let derivatives = columns
-            .zip(&places)
-            .map(|(shifted, place)| {
-                let step = self.step(model, *place);
+            .zip(&coordinates)
+            .map(|(shifted, coordinate)| {
+                let step = self.step(model, *coordinate);
                 let of_run = |(a, b): (&Residuals, &Residuals)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect();
                 shifted.iter().zip(&plain).map(of_run).collect()
             })
@@ -186,32 +198,38 @@ impl<'a> Bench<'a> {
         Ok((plain, derivatives))
     }
 
-    /// Fits a model's coordinates to `runs`, from where they are.
+    /// Fits a model's coordinates to `runs`, from those of `start`.
     ///
     /// # Errors
-    /// If the start cannot be simulated.
-    pub fn fit(&self, start: &Model, runs: &[usize], care: Care) -> Result<Fit, String> {
-        self.fit_held(start, runs, care, None)
+    /// [`DiagnoseError`] if `start` or a step of the finite differences cannot be simulated.
+    pub fn fit(&self, start: &Model, runs: &[usize], convergence: Convergence) -> Result<Fit, DiagnoseError> {
+        self.fit_held(start, runs, convergence, None)
     }
 
-    /// The same with one coordinate held.
-    fn fit_held(&self, start: &Model, runs: &[usize], care: Care, fixed: Option<(usize, usize)>) -> Result<Fit, String> {
-        let (enough, most) = match care {
-            Care::Rank => (ENOUGH_TO_RANK, MOST_ROUNDS_TO_RANK),
-            Care::Full => (ENOUGH_OF_ITSELF, MOST_ROUNDS),
+    /// [`fit`](Self::fit) with one coordinate, term and parameter, held.
+    fn fit_held(
+        &self,
+        start: &Model,
+        runs: &[usize],
+        convergence: Convergence,
+        fixed: Option<(usize, usize)>,
+    ) -> Result<Fit, DiagnoseError> {
+        let (tolerance, most) = match convergence {
+            Convergence::Rank => (RELATIVE_TOLERANCE_TO_RANK, MOST_ITERATIONS_TO_RANK),
+            Convergence::Full => (RELATIVE_TOLERANCE, MOST_ITERATIONS),
         };
         let mut model = start.clone();
-        let places = places(&model);
+        let coordinates = coordinates(&model);
         let count = self.count(runs);
-        let n = places.len();
+        let n = coordinates.len();
         let mut lambda = 1e-3;
         let mut chi2 = f64::INFINITY;
         let mut information = DMatrix::zeros(n, n);
-        let mut rounds = 0;
-        'rounds: while rounds < most {
-            rounds += 1;
+        let mut iterations = 0;
+        'iterations: while iterations < most {
+            iterations += 1;
             let (residuals, derivatives) = self.linearised(&model, runs)?;
-            chi2 = residuals.iter().map(|r| square(r)).sum();
+            chi2 = residuals.iter().map(|r| sum_of_squares(r)).sum();
             let gradient = DVector::from_fn(n, |i, _| dot(&derivatives[i], &residuals));
             information = DMatrix::from_fn(n, n, |i, j| if i <= j { dot(&derivatives[i], &derivatives[j]) } else { 0.0 });
             information.fill_lower_triangle_with_upper_triangle();
@@ -219,14 +237,15 @@ impl<'a> Bench<'a> {
                 break;
             }
             loop {
-                // Coordinates that push against their bounds stay there.
-                let bounds =
-                    |k: usize| self.plant.candidates()[model.terms[places[k].0].candidate].parameters[places[k].1].bounds;
-                let x = |k: usize| model.terms[places[k].0].x[places[k].1];
+                // Coordinates at a bound with the gradient pointing outwards are held.
+                let bounds = |k: usize| {
+                    self.plant.candidates()[model.terms[coordinates[k].0].candidate].parameters[coordinates[k].1].bounds
+                };
+                let x = |k: usize| model.terms[coordinates[k].0].x[coordinates[k].1];
                 let held: Vec<bool> = (0..n)
                     .map(|k| {
                         let [low, high] = bounds(k);
-                        Some(places[k]) == fixed || (x(k) <= low && gradient[k] > 0.0) || (x(k) >= high && gradient[k] < 0.0)
+                        Some(coordinates[k]) == fixed || (x(k) <= low && gradient[k] > 0.0) || (x(k) >= high && gradient[k] < 0.0)
                     })
                     .collect();
                 let mut matrix = information.clone();
@@ -242,9 +261,9 @@ impl<'a> Bench<'a> {
                         right[k] = 0.0;
                     }
                 }
-                let Some(step) = matrix.lu().solve(&right) else { break 'rounds };
+                let Some(step) = matrix.lu().solve(&right) else { break 'iterations };
                 let mut trial = model.clone();
-                for (k, (term, parameter)) in places.iter().enumerate() {
+                for (k, (term, parameter)) in coordinates.iter().enumerate() {
                     let [low, high] = bounds(k);
                     let slot = &mut trial.terms[*term].x[*parameter];
                     *slot = (*slot + step[k]).clamp(low, high);
@@ -255,37 +274,37 @@ impl<'a> Bench<'a> {
                     model = trial;
                     chi2 = found;
                     lambda = (lambda * 0.1).max(1e-9);
-                    if gain < ENOUGH * count as f64 || gain < enough * (found - count as f64).max(0.0).max(ENOUGH * count as f64)
+                    if gain < TOLERANCE * count as f64
+                        || gain < tolerance * (found - count as f64).max(0.0).max(TOLERANCE * count as f64)
                     {
-                        break 'rounds;
+                        break 'iterations;
                     }
                     break;
                 }
                 lambda *= 10.0;
                 if lambda > 1e6 || trial == model {
-                    break 'rounds;
+                    break 'iterations;
                 }
             }
         }
         Ok(Fit { model, chi2, count, information })
     }
 
-    /// χ² of a model with one coordinate held where it is and all others fitted again, from near where they are best: where much is left that no
-    /// coordinate explains, χ² is known to a part of that.
+    /// Profile χ²: the coordinate `held` (term, parameter) is fixed and all others are fitted, to the convergence of [`Convergence::Rank`].
     ///
     /// # Errors
-    /// If it cannot be simulated.
-    pub fn profile(&self, start: &Model, held: (usize, usize), runs: &[usize]) -> Result<f64, String> {
-        Ok(self.fit_held(start, runs, Care::Rank, Some(held))?.chi2)
+    /// [`DiagnoseError`] if `start` cannot be simulated.
+    pub fn profile(&self, start: &Model, held: (usize, usize), runs: &[usize]) -> Result<f64, DiagnoseError> {
+        Ok(self.fit_held(start, runs, Convergence::Rank, Some(held))?.chi2)
     }
 
-    /// How much larger than for independent noise the variance of each coordinate is, from the residuals as they are: with blocks b of values that
-    /// may hang together, C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against C = (JᵀJ)⁻¹. Blocks are fifty values, and whole runs (of R, by R/(R − 1) more): the
-    /// larger counts, and it is at least 1, and at least χ² per value.
+    /// Variance inflation of each coordinate over that of independent noise, by the sandwich estimator: C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against
+    /// C = (JᵀJ)⁻¹, summed over blocks b within which residuals may be correlated. Blocks are 50 values, or whole runs (times R/(R − 1) for R
+    /// runs); the larger ratio counts, and it is at least 1 and at least χ² per value.
     ///
     /// # Errors
-    /// If the model cannot be simulated.
-    pub fn inflation(&self, model: &Model, runs: &[usize], covariance: &DMatrix<f64>) -> Result<Vec<f64>, String> {
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn inflation(&self, model: &Model, runs: &[usize], covariance: &DMatrix<f64>) -> Result<Vec<f64>, DiagnoseError> {
         let (residuals, derivatives) = self.linearised(model, runs)?;
         let n = derivatives.len();
         let ratios = |block: usize| -> Vec<f64> {
@@ -304,14 +323,18 @@ impl<'a> Bench<'a> {
         };
         let few = runs.len() as f64 / (runs.len() as f64 - 1.0).max(1.0);
         let count = self.count(runs).max(1) as f64;
-        let least = (residuals.iter().map(|r| square(r)).sum::<f64>() / count).max(1.0);
+        let least = (residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>() / count).max(1.0);
         let (short, whole) = (ratios(BLOCK), ratios(usize::MAX));
-        // Where the runs say nothing of a coordinate its ratio is not a number, and `max` takes the other.
+        // `max` ignores the NaN of a coordinate that the runs do not determine.
         Ok(short.into_iter().zip(whole).map(|(short, whole)| least.max(short).max(few * whole)).collect())
     }
 
-    /// Leaves out values whose residuals stand far above those around them in their channel: what a tracker lost for a row or two. Returns how many.
-    pub fn leave_out_spikes(&mut self, model: &Model) -> Result<usize, String> {
+    /// Masks single values whose residuals stand far above those around them in their channel, as after a tracker's slip, and returns their number.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn leave_out_spikes(&mut self, model: &Model) -> Result<usize, DiagnoseError> {
+        // Least residual (σ), and rows on either side.
         const FAR: f64 = 6.0;
         const AROUND: usize = 8;
         let mut count = 0;
@@ -325,7 +348,7 @@ impl<'a> Bench<'a> {
                     .map(|k| residuals[k].abs())
                     .collect();
                 around.sort_by(f64::total_cmp);
-                // Beyond what three quarters of the neighbours show, so that a true jump or peak stays.
+                // The upper quartile of the neighbours, so that a true jump or peak stays.
                 let usual = around.get(3 * around.len() / 4).copied().unwrap_or(f64::INFINITY);
                 if self.used[run][at] && residuals[at].abs() > FAR + 3.0 * usual {
                     self.used[run][at] = false;
@@ -336,11 +359,11 @@ impl<'a> Bench<'a> {
         Ok(count)
     }
 
-    /// Fits what belongs to each run on its own, for a model as it is.
+    /// Fits the nuisance parameters of each run, with the model held.
     ///
     /// # Errors
-    /// If the model cannot be simulated.
-    pub fn fit_nuisances(&mut self, model: &Model, runs: &[usize]) -> Result<(), String> {
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn fit_nuisances(&mut self, model: &Model, runs: &[usize]) -> Result<(), DiagnoseError> {
         const STEP: f64 = 0.05;
         for &run in runs {
             for _ in 0..3 {
@@ -362,9 +385,8 @@ impl<'a> Bench<'a> {
                         let r = self.residuals_with(model, run, &moved)?;
                         Ok(r.iter().zip(&plain).map(|(a, b)| (a - b) / step).collect())
                     })
-                    .collect::<Result<_, String>>()?;
+                    .collect::<Result<_, DiagnoseError>>()?;
                 let n = shares.len();
-                let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
                 let gradient: Vec<f64> = columns.iter().map(|column| inner(column, &plain)).collect();
                 let held: Vec<bool> =
                     (0..n).map(|k| (shares[k] >= 1.0 && gradient[k] < 0.0) || (shares[k] <= 0.0 && gradient[k] > 0.0)).collect();
@@ -379,11 +401,11 @@ impl<'a> Bench<'a> {
                 });
                 let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
                 let Some(step) = matrix.lu().solve(&right) else { break };
-                let before = square(&plain);
+                let before = sum_of_squares(&plain);
                 let mut better = None;
                 for part in [1.0, 0.3, 0.1] {
                     let trial: Vec<f64> = shares.iter().zip(step.iter()).map(|(x, by)| (x + part * by).clamp(0.0, 1.0)).collect();
-                    let chi2 = square(&self.residuals_with(model, run, &trial)?);
+                    let chi2 = sum_of_squares(&self.residuals_with(model, run, &trial)?);
                     if chi2 < before {
                         better = Some((trial, chi2));
                         break;
@@ -400,16 +422,22 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Term and parameter of every coordinate.
-pub fn places(model: &Model) -> Vec<(usize, usize)> {
+/// Term and parameter of every coordinate, in order.
+pub fn coordinates(model: &Model) -> Vec<(usize, usize)> {
     model.terms.iter().enumerate().flat_map(|(term, t)| (0..t.x.len()).map(move |parameter| (term, parameter))).collect()
 }
 
 /// Sum of squares.
-pub fn square(values: &[f64]) -> f64 {
+pub fn sum_of_squares(values: &[f64]) -> f64 {
     values.iter().map(|value| value * value).sum()
 }
 
+/// Inner product.
+pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Inner product over all runs.
 fn dot(a: &[Residuals], b: &[Residuals]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>()).sum()
+    a.iter().zip(b).map(|(a, b)| inner(a, b)).sum()
 }

@@ -1,13 +1,20 @@
-//! From measured data to what the simulation gets wrong, why, and by how much less it is wrong with the cause in the model.
+//! Diagnosis of model error from measured data: detect, locate, characterise and estimate what the simulation lacks.
 //!
-//! The way: [`dataset`] reads runs, [`quality`] looks for noise, outliers and frozen markers, [`voltage`] reads commands between rows. [`plant`] is all
-//! that the loop knows of the thing that was measured; [`robot`] makes our robots one. [`fit`] does least squares, [`search`] screens candidates,
-//! adds and takes out causes and judges them on runs that no fit saw, and [`pipeline`] puts it together: numerics before constants, constants and
-//! measurement errors before physics, ties named as ties, and what is left described ([`tests`]) in a [`diagnosis`]. [`protocols`] proposes what to measure next;
-//! [`report`] and [`extended`] write it down, in the words of [`names`]; [`observations`] does what can be done with single published numbers.
+//! [`dataset`] reads runs, [`quality`] estimates noise and masks outliers and frozen markers, [`voltage`] interpolates commands between rows. A
+//! [`plant`] is the measured system with its model; [`robot`] is the plant of this crate's robots. [`fit`] is bounded least squares; [`search`] selects
+//! causes on held-out runs; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
+//! [residual tests](residual_tests) of the final model, in a [`diagnosis`]. [`protocols`] proposes the next measurement; [`report`] and [`extended`]
+//! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers.
+//!
+//! # References
+//! G. Kerschen, K. Worden, A. F. Vakakis and J.-C. Golinval, "Past, present and future of nonlinear system identification in structural dynamics",
+//! Mech. Syst. Signal Process. 20 (2006) 505; J. Brynjarsdóttir and A. O'Hagan, "Learning about physical parameters: the importance of model
+//! discrepancy", Inverse Problems 30 (2014) 114007.
 
+mod candidates;
 pub mod dataset;
 pub mod diagnosis;
+mod error;
 pub mod extended;
 pub mod fit;
 mod intervals;
@@ -21,5 +28,9 @@ pub mod quality;
 pub mod report;
 pub mod residual_tests;
 pub mod robot;
+mod run_csv;
 pub mod search;
+mod track;
 pub mod voltage;
+
+pub use error::DiagnoseError;

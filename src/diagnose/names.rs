@@ -1,10 +1,10 @@
-//! What causes, their forms and their numbers are called where people read them. Files keep the ids of [`effects`](crate::effects).
+//! Names of causes, their forms and parameters in texts and reports. Files keep the ids of [`effects`](crate::effects).
 
 use super::diagnosis::{Adopted, Estimate};
 use crate::model::{Laminate, Robot};
 use crate::view::{digits_for, fixed};
 
-/// A cause in words.
+/// The name of a cause.
 pub fn cause(id: &str) -> String {
     match id {
         "stiffness" => "bending stiffness".into(),
@@ -18,7 +18,7 @@ pub fn cause(id: &str) -> String {
     }
 }
 
-/// Which form of a cause that has several: by what is given of it and what is fitted. Empty for the others.
+/// The form of a cause that has several, from its given (`fixed`) and fitted parameters; empty for the others.
 pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Iterator<Item = &'a str>) -> String {
     let given = |name: &str| fixed.iter().find(|(key, _)| key.as_ref() == name).map(|(_, value)| *value);
     match id {
@@ -44,7 +44,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
     }
 }
 
-/// A cause with its form.
+/// The name of a cause with its form.
 pub fn with_form(id: &str, form: &str) -> String {
     if form.is_empty() { cause(id) } else { format!("{}, {form}", cause(id)) }
 }
@@ -54,7 +54,7 @@ pub fn form_of(effect: &Adopted) -> String {
     form(&effect.id, &effect.fixed, effect.parameters.iter().map(|p| p.name.as_str()))
 }
 
-/// A number of a cause in words, without its unit.
+/// The name of a parameter of a cause, without its unit.
 pub fn parameter(id: &str, name: &str) -> String {
     match (id, name) {
         (_, "scale") => cause(id),
@@ -87,7 +87,7 @@ pub fn parameter(id: &str, name: &str) -> String {
     }
 }
 
-/// A fitted number in words: name, value, range and unit.
+/// A parameter in words: name, value, interval and unit.
 pub fn words(id: &str, p: &Estimate) -> String {
     let what = if p.name == "scale" { "times the nominal".into() } else { parameter(id, &p.name) };
     let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
@@ -101,7 +101,7 @@ pub fn words(id: &str, p: &Estimate) -> String {
     }
 }
 
-/// The constants of the nominal model that calibration scales: cause, value, unit.
+/// The constants of the nominal model that calibration scales: id, value, unit.
 pub fn constants(robot: &Robot) -> [(&'static str, f64, &'static str); 4] {
     let laminate = Laminate::new(&robot.material);
     [
@@ -113,22 +113,22 @@ pub fn constants(robot: &Robot) -> [(&'static str, f64, &'static str); 4] {
     ]
 }
 
-/// A fitted number as it is shown.
+/// A parameter as shown in a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shown {
-    /// What it is.
+    /// Its name.
     pub name: String,
-    /// Its value, with the digits that its range is worth.
+    /// Its value, with the digits that its interval justifies.
     pub value: String,
-    /// The range that holds it in 95 % of cases.
+    /// Its 95 % confidence interval.
     pub range: String,
-    /// Unit; a dash for plain numbers.
+    /// Its unit; a dash for dimensionless ones.
     pub unit: String,
-    /// What is to be known beside: how far a constant is from its nominal value, whether a value ended at a limit.
+    /// A remark: a constant relative to its nominal value, or a value at a bound.
     pub note: String,
 }
 
-/// An estimate of a cause's number; constants of the nominal model in their own units.
+/// An estimate of a parameter of cause `id`; scales of [`constants`] in the constants' own units.
 pub fn shown(id: &str, estimate: &Estimate, constants: &[(&str, f64, &str)]) -> Shown {
     let constant = constants.iter().find(|(of, ..)| *of == id && estimate.name == "scale");
     let (factor, unit) = constant.map_or((1.0, estimate.unit.as_str()), |(_, nominal, unit)| (*nominal, *unit));
@@ -145,7 +145,7 @@ pub fn shown(id: &str, estimate: &Estimate, constants: &[(&str, f64, &str)]) -> 
         notes.push(format!("{} × the nominal {}", fixed(estimate.value, 3), fixed(*nominal, digits)));
     }
     if estimate.at_bound {
-        notes.push("at the end of what is tried".into());
+        notes.push("at a bound of the fit".into());
     }
     Shown {
         name: parameter(id, &estimate.name),
@@ -159,7 +159,7 @@ pub fn shown(id: &str, estimate: &Estimate, constants: &[(&str, f64, &str)]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::robot::candidates;
+    use crate::diagnose::candidates::candidates;
     use crate::effects::EFFECTS;
     use crate::experiment::{self, Source, presets};
 

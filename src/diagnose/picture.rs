@@ -1,4 +1,4 @@
-//! All residual tests of all runs and models as one picture.
+//! The residual tests of all runs and models as one figure.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use crate::view::{escape, significant};
 /// Side of a test's square and the room between two models (px).
 const SIDE: f64 = 16.0;
 const GAP: f64 = 14.0;
-/// Height of the names over the columns, and width of a character at the font's size (px).
+/// Height of the column names, and width of a character (px).
 const HEAD: f64 = 128.0;
 const CHARACTER: f64 = 6.3;
 /// Fills: passed, and failed by up to twice, five times and more than five times the limit.
@@ -36,7 +36,7 @@ fn fill(test: &ResidualTest) -> &'static str {
     }
 }
 
-/// A square for every test: a row for each run, beside one another the models, in each a column for every kind of test. Failed ones are crossed.
+/// The figure (SVG): a panel for each model, in it a row for each run and a column for each test. Failed tests are crossed.
 pub fn residual_tests(models: &[(&str, &[ResidualTest])]) -> String {
     let (mut runs, mut kinds): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
     for test in models.iter().flat_map(|(_, tests)| *tests) {
@@ -106,7 +106,7 @@ pub fn residual_tests(models: &[(&str, &[ResidualTest])]) -> String {
     out + "</svg>\n"
 }
 
-/// A cross over the square at `x` and `y`: failures show without colours too.
+/// A cross over the square at `x`, `y` (px), so that failures show without colours too.
 fn cross(x: f64, y: f64, is_dark: bool) -> String {
     let (a, b) = (3.5, SIDE - 4.5);
     let colour = if is_dark { "#fff" } else { "#111" };

@@ -1,59 +1,61 @@
-//! The whole loop, from a plant to a [`Diagnosis`].
+//! The diagnosis of a plant, from its measured runs to a [`Diagnosis`].
 
+use super::DiagnoseError;
 use super::dataset::Role;
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict, failing, summary};
-use super::fit::{BLOCK, Bench, Residuals};
+use super::fit::{BLOCK, Estimator, Residuals};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
 
-/// Joints per actuator that the search begins with, if the plant has so many: what finer ones change, re-tuned constants take up.
+/// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
 const SEARCH_RESOLUTION: f64 = 10.0;
-/// Structure is left if χ² per value is above 1 by so much (a misfit of half the noise), ...
+/// Structure is left if χ² per value exceeds 1 by this (a misfit of σ/2), ...
 const LEFT_OVER: f64 = 0.25;
-/// ... and by so much of what the refined nominal model leaves: true causes in other equations than the library's left 0.6 % at most. With three or
-/// more causes it takes less, in inverse proportion to one less than their number: a handful of causes that still leave something are the shadow
-/// of one that is not in the library.
+/// ... and by this share of what the refined nominal model leaves: true causes with other equations than the library's leave 0.6 % at most. For n
+/// causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
 const LEFT_SHARE: f64 = 0.02;
-/// Above this share nothing is named at all.
+/// No cause is named if a larger share is left.
 const NOTHING_NAMED: f64 = 0.5;
-/// Replacements are looked at again, at the full precision, if their χ² is above the best one's by no more than this.
+/// Replacements are refitted like the best model if their χ² exceeds its own by no more than this.
 const NEAR_TIE: f64 = 500.0;
-/// χ² of one, two, ... degrees of freedom that noise exceeds in 5 % of cases.
+/// 95 % quantiles of χ² of one to four degrees of freedom.
 const CHI2_95: [f64; 4] = [3.841, 5.991, 7.815, 9.488];
-/// Fewest values to fit and to judge by: two blocks and one of those that structure of the residuals may extend over.
+/// Fewest values to fit and to judge by, in whole blocks of correlated residuals.
 const LEAST_FITTED: usize = 2 * BLOCK;
 const LEAST_HELD: usize = BLOCK;
-/// What to measure where there is too little.
+/// The next experiment where the data are insufficient.
 const MORE_RUNS: &str = "measure three runs or more under voltages of different size and speed, with a hundred rows each or more";
 
-/// The diagnosis with the models behind it, for figures and for going on.
+/// The diagnosis with its models, for figures and for the extended experiment.
 pub struct Outcome {
-    /// What was found.
+    /// The diagnosis.
     pub diagnosis: Diagnosis,
-    /// The nominal model as it was given.
+    /// The nominal model.
     pub nominal: Scored,
-    /// Re-tuned constants, refined discretisation.
+    /// The nominal model with re-tuned constants and refined discretisation.
     pub calibrated: Scored,
-    /// All causes.
+    /// The model with all adopted causes.
     pub extended: Scored,
-    /// Models that do as well as the extended one.
+    /// Models that the data cannot tell from the extended one.
     pub tied: Vec<Scored>,
-    /// The runs.
+    /// Fit and held-out runs.
     pub split: Split,
-    /// Moments of jumps as they were found.
+    /// Fitted nuisance parameters.
     pub nuisances: super::fit::Nuisances,
-    /// Which values counted.
+    /// True for the values that counted, runs × values.
     pub used: Vec<Vec<bool>>,
 }
 
-/// Diagnoses a plant's measured runs. `name` and `quality` are passed on; `roles` say what runs are for; `progress` is told what is tried;
-/// `separate` proposes what to measure next, given the models that are tied.
+/// Diagnoses a plant's measured runs.
+///
+/// `name` and `quality` (remarks on the data) are passed on to the diagnosis; `roles` fix the roles of runs; `progress` receives the current task in
+/// words; `separate` proposes the next measurement for tied models.
 ///
 /// # Errors
-/// If the nominal model cannot be simulated, in words.
+/// [`DiagnoseError`] if the nominal model cannot be simulated.
 pub fn diagnose(
     plant: &dyn Plant,
     name: &str,
@@ -61,33 +63,33 @@ pub fn diagnose(
     quality: Vec<String>,
     progress: &(dyn Fn(&str) + Sync),
     separate: &dyn Fn(&[Model]) -> Option<String>,
-) -> Result<Outcome, String> {
+) -> Result<Outcome, DiagnoseError> {
     let split = split(plant, roles);
     let mut remarks = Vec::new();
-    let ladder = plant.resolutions();
-    let nominal_resolution = ladder.first().copied().unwrap_or(1.0);
-    let start = ladder.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
-    let mut search = Search { bench: Bench::new(plant), split, progress, unexplained: 0.0 };
+    let resolutions = plant.resolutions();
+    let nominal_resolution = resolutions.first().copied().unwrap_or(1.0);
+    let start = resolutions.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
+    let mut search = Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0 };
 
     progress("the nominal model");
     let nominal = search.fitted(&Model { terms: Vec::new(), resolution: nominal_resolution, fine: true })?;
     progress("constants of the nominal model");
     let mut calibrated = search.calibrated(start)?;
-    let spikes = search.bench.leave_out_spikes(calibrated.model())?;
+    let spikes = search.estimator.leave_out_spikes(calibrated.model())?;
     if spikes > 0 {
         calibrated = search.calibrated(start)?;
     }
-    let poor = insufficient_data(plant, &search.split);
-    let Causes { best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, poor.is_some())?;
+    let insufficient = insufficient_data(plant, &search.split);
+    let Causes { best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, insufficient.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
     }
 
-    // Refined, but without any cause: what the causes have to explain.
+    // The refined nominal model: its misfit is what the causes have to explain.
     let bare = search.fitted(&Model { terms: Vec::new(), resolution: best.model().resolution, fine: true })?;
     let mut judged = judge(&search, best, &bare, nominal_resolution)?;
     remarks.extend(judged.remark.take());
-    // A cause whose range holds the value at which it does nothing is not named.
+    // A cause whose interval contains its off value is not named.
     let (mut doubts, mut dropped) = (Vec::new(), None);
     while let Some((index, words)) = doubtful(&search, &judged)? {
         let mut model = judged.best.model().clone();
@@ -98,8 +100,8 @@ pub fn diagnose(
     }
     remarks.extend(doubts.iter().cloned());
     let Judged { best, coarse, refined, left, unexplained_fraction, is_unexplained, intervals, remark: _ } = judged;
-    let above = |scored: &Scored| scored.above(search.bench.count(&search.split.all()));
-    progress("what could stand in the place of what was found");
+    let above = |scored: &Scored| scored.above(search.estimator.count(&search.split.all()));
+    progress("tied causes");
     let tied = ties(&search, &best, &replaced, coarse_total);
     let mut effects = Vec::new();
     if refined {
@@ -109,33 +111,34 @@ pub fn diagnose(
         effects.push(adopted(&search, &best, index, term, &intervals, &tied)?);
     }
     let physics = best.model().terms.len();
-    let poor = poor.or_else(|| if physics == 0 { doubts.first().cloned() } else { None });
+    let insufficient = insufficient.or_else(|| if physics == 0 { doubts.first().cloned() } else { None });
     let verdict = match () {
         () if is_unexplained => Verdict::Unexplained,
-        () if physics == 0 && poor.is_some() && above(&best) > LEFT_OVER => Verdict::Unexplained,
+        () if physics == 0 && insufficient.is_some() && above(&best) > LEFT_OVER => Verdict::Unexplained,
         () if physics == 0 => Verdict::None,
         () if effects.iter().any(|effect| !effect.tied_with.is_empty()) => Verdict::Tied,
         () => Verdict::Named,
     };
-    if let Some(poor) = poor.as_ref().filter(|poor| !remarks.contains(poor)) {
-        remarks.push(poor.clone());
+    if let Some(insufficient) = insufficient.as_ref().filter(|insufficient| !remarks.contains(insufficient)) {
+        remarks.push(insufficient.clone());
     }
     let models: Vec<Model> =
         std::iter::once(best.model().clone()).chain(tied.iter().map(|(_, t)| t.scored.model().clone())).collect();
-    let next_experiment = match (verdict, dropped, &poor) {
+    let next_experiment = match (verdict, dropped, &insufficient) {
         (Verdict::Tied, ..) => separate(&models),
-        // With what was dropped and without it.
+        // With and without the last cause that was dropped.
         (_, Some(dropped), _) => separate(&[best.model().clone(), dropped]),
         (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
         _ => None,
     };
     let unexplained = if is_unexplained {
-        super::residual_tests::describe(plant, &search.split, &search.bench.used, &best.residuals)
+        super::residual_tests::describe(plant, &search.split, &search.estimator.used, &best.residuals)
     } else {
         Vec::new()
     };
 
-    let stage = |scored: &Scored, parameters: Vec<Estimate>| stage(plant, &search.split, &search.bench.used, scored, parameters);
+    let stage =
+        |scored: &Scored, parameters: Vec<Estimate>| stage(plant, &search.split, &search.estimator.used, scored, parameters);
     let constants = intervals_of(&search, &calibrated, &[])?;
     let parameters = |scored: &Scored, found: &Intervals| -> Vec<Estimate> {
         let terms = scored.model().terms.iter().enumerate();
@@ -148,7 +151,7 @@ pub fn diagnose(
     let ranked = |trial: &Trial| Ranked {
         id: search.id(trial.candidate).to_owned(),
         form: form(trial.candidate),
-        rmse_heldout_mm: rmse(plant, &search.bench.used, &trial.scored.residuals, &search.split.held),
+        rmse_heldout_mm: rmse(plant, &search.estimator.used, &trial.scored.residuals, &search.split.held),
         delta_bic: trial.scored.bic() - calibrated.bic(),
     };
     let sigmas: Vec<f64> = plant.signals().iter().flat_map(|signal| signal.sigmas.iter().copied()).collect();
@@ -162,12 +165,12 @@ pub fn diagnose(
             verdict,
             &effects,
             unexplained_fraction,
-            poor.as_deref(),
+            insufficient.as_deref(),
             best.model().resolution,
             refined,
             failed.as_deref(),
         ),
-        // Where what is left is no more than noise, its share of a small misfit says nothing: it is given as a share of the noise then.
+        // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
         unexplained_fraction: if is_unexplained { unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
         unexplained,
         noise_mm: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64,
@@ -188,32 +191,34 @@ pub fn diagnose(
         calibrated,
         extended: best,
         tied: tied.into_iter().map(|(_, trial)| trial.scored).collect(),
-        nuisances: search.bench.nuisances.clone(),
-        used: search.bench.used.clone(),
+        nuisances: search.estimator.nuisances.clone(),
+        used: search.estimator.used.clone(),
         split: search.split,
     })
 }
 
-/// A model with all causes beside what it has to explain.
+/// A model with all causes, and the misfit that it leaves.
 struct Judged {
     best: Scored,
-    /// With the nominal number of joints.
+    /// The same with the nominal discretisation.
     coarse: Scored,
-    /// Whether the data ask for another number of joints than the nominal one.
+    /// True if the data need another discretisation than the nominal one.
     refined: bool,
     /// χ² per value above 1.
     left: f64,
+    /// The same as a share of the refined nominal model's, at most 1.
     unexplained_fraction: f64,
+    /// True if structure is left.
     is_unexplained: bool,
     intervals: Intervals,
-    /// That nothing is named, if so.
+    /// The remark that no cause is named, if so.
     remark: Option<String>,
 }
 
-/// Looks at what `best` leaves of what `bare`, without any cause, leaves, whether the discretisation matters, and how far the data leave the causes open.
-fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f64) -> Result<Judged, String> {
-    let plant = search.bench.plant;
-    let count = search.bench.count(&search.split.all());
+/// Judges `best` against `bare`, the refined nominal model: the misfit left, the need of refinement, and the intervals of the causes.
+fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f64) -> Result<Judged, DiagnoseError> {
+    let plant = search.estimator.plant;
+    let count = search.estimator.count(&search.split.all());
     let above = |scored: &Scored| scored.above(count);
     let (left, whole) = (above(&best), above(bare));
     let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
@@ -224,14 +229,14 @@ fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f
     if unnamed && !best.model().terms.is_empty() {
         let names: Vec<_> = best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
         remark = Some(format!(
-            "nothing is named: the nearest, {}, leaves {:.0} % of the misfit",
-            names.join(" with "),
+            "no cause is named: the best model, with {}, leaves {:.0} % of the misfit",
+            names.join(" and "),
             100.0 * unexplained_fraction
         ));
         best = bare.clone();
     }
 
-    // Is it the discretisation?
+    // The nominal discretisation is kept unless the data need another.
     let coarse = search.fitted(&Model { resolution: nominal_resolution, ..best.model().clone() })?;
     let refined = best.model().resolution != nominal_resolution && search.is_worth(&best, &coarse);
     if best.model().resolution != nominal_resolution && !refined && above(&coarse) <= above(&best) + 0.01 {
@@ -239,29 +244,30 @@ fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f
     }
 
     let mut numerics = numerics(search, &best)?;
-    // What is left may pull at the causes: by no more than its share of what they explain.
+    // Unexplained structure may bias the coordinates, at most by its share of what the causes explain.
     let free = best.model().terms.iter().flat_map(|term| {
         let parameters = &plant.candidates()[term.candidate].parameters;
         term.x.iter().zip(parameters).map(|(x, p)| x - p.off.unwrap_or(*x))
     });
-    for (numerics, reach) in numerics.iter_mut().zip(free) {
-        *numerics = numerics.hypot(reach * unexplained_fraction.sqrt());
+    for (numerics, distance) in numerics.iter_mut().zip(free) {
+        *numerics = numerics.hypot(distance * unexplained_fraction.sqrt());
     }
     let intervals = intervals_of(search, &best, &numerics)?;
     Ok(Judged { best, coarse, refined, left, unexplained_fraction, is_unexplained, intervals, remark })
 }
 
-/// A cause of the model that the data do not tell from none, the least certain if there are several, and how to say so: the 95 % ranges of all its
-/// parameters that can switch it off hold the value where they do. Of several such parameters, which may make up for one another, χ² without the cause decides as
-/// well.
-fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>, String> {
+/// A term that the data do not tell from its absence, the least certain one if there are several, with a remark in words.
+///
+/// The 95 % intervals of all its parameters with an off value contain that value. Several such parameters may compensate each other, so χ² without the
+/// term has to agree.
+fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>, DiagnoseError> {
     let Judged { best, intervals, .. } = judged;
     let mut first = 0;
     let mut found: Option<(f64, usize, String)> = None;
     for (index, term) in best.model().terms.iter().enumerate() {
         let own = first..first + term.x.len();
         first = own.end;
-        let candidate = &search.bench.plant.candidates()[term.candidate];
+        let candidate = &search.estimator.plant.candidates()[term.candidate];
         let switches: Vec<(usize, f64)> =
             own.clone().zip(&candidate.parameters).filter_map(|(k, free)| Some((k, free.off?))).collect();
         let holds = |(k, off): &(usize, f64)| (intervals.ends[*k][0]..=intervals.ends[*k][1]).contains(off);
@@ -279,8 +285,8 @@ fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>,
         let numbers: Vec<String> =
             estimates(search, index, term, intervals).iter().map(|e| names::words(candidate.id, e)).collect();
         let words = format!(
-            "the data are insufficient to name a cause: with {} ({}) they would be explained as well as without it, for the range reaches the value at \
-             which it does nothing",
+            "the data are insufficient to name a cause: they are explained as well without {} ({}), whose interval contains the value at which it has \
+             no effect",
             names::cause(candidate.id),
             numbers.join("; ")
         );
@@ -291,29 +297,28 @@ fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize, String)>,
     Ok(found.map(|(_, index, words)| (index, words)))
 }
 
-/// What the search comes to.
+/// Result of the search.
 struct Causes {
-    /// The model with all causes that the data ask for, to the last digits.
+    /// The model with all causes, after the final refit.
     best: Scored,
     /// The candidates on top of re-tuned constants, best first.
     trials: Vec<Trial>,
-    /// What could stand in the place of every cause.
+    /// Replacements of every cause: the index of the term, and the trial.
     replaced: Vec<(usize, Trial)>,
-    /// χ² of the best model before the last digits, beside which those were judged.
+    /// χ² of the best model before the final refit, with which replacements are compared.
     coarse_total: f64,
-    /// Single values that were left out.
+    /// Number of single values that were masked.
     spikes: usize,
 }
 
-/// Adds causes to re-tuned constants, takes out what is not needed, tries others in the place of each. Data that are too `poor` to tell causes apart
-/// get none.
-fn find(search: &mut Search, calibrated: &Scored, poor: bool) -> Result<Causes, String> {
-    let (mut best, trials) = if poor {
+/// Forward selection, backward elimination, replacement and the final refit; no causes where the data are insufficient.
+fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
+    let (mut best, trials) = if is_insufficient {
         (search.fitted(&Model { terms: Vec::new(), ..calibrated.model().clone() })?, Vec::new())
     } else {
         search.forward(calibrated.clone())?
     };
-    let spikes = search.bench.leave_out_spikes(best.model())?;
+    let spikes = search.estimator.leave_out_spikes(best.model())?;
     if spikes > 0 {
         best = search.settle(best)?;
     }
@@ -323,7 +328,7 @@ fn find(search: &mut Search, calibrated: &Scored, poor: bool) -> Result<Causes, 
 
     let mut replaced: Vec<(usize, Trial)> = Vec::new();
     for _ in 0..2 {
-        if poor || best.model().terms.is_empty() {
+        if is_insufficient || best.model().terms.is_empty() {
             break;
         }
         replaced = search.replacements(&best, 4)?;
@@ -341,7 +346,7 @@ fn find(search: &mut Search, calibrated: &Scored, poor: bool) -> Result<Causes, 
         best = search.backward(best)?;
     }
     let coarse_total = best.total();
-    (search.progress)("the last digits");
+    (search.progress)("the final refit");
     best = search.fitted(&Model { fine: true, ..best.model().clone() })?;
     best = search.resolve(best)?;
     best = search.backward(best)?;
@@ -349,7 +354,7 @@ fn find(search: &mut Search, calibrated: &Scored, poor: bool) -> Result<Causes, 
     Ok(Causes { best, trials, replaced, coarse_total, spikes })
 }
 
-/// Why the data cannot decide, if so.
+/// Why the data are insufficient to tell causes apart, if so.
 fn insufficient_data(plant: &dyn Plant, split: &Split) -> Option<String> {
     let signals = plant.signals();
     if signals.len() < 2 || split.held.is_empty() {
@@ -365,19 +370,20 @@ fn insufficient_data(plant: &dyn Plant, split: &Split) -> Option<String> {
             "{fitted} values to fit and {held} to judge by are too little to tell causes apart: {LEAST_FITTED} and {LEAST_HELD} are needed at least"
         ));
     }
-    let still = |run: &usize| {
+    let is_constant = |run: &usize| {
         let inputs = &signals[*run].inputs;
         inputs.iter().all(|u| (u - inputs[0]).abs() < 1e-9)
     };
     let levels: Vec<f64> = signals.iter().filter_map(|signal| signal.inputs.first().copied()).collect();
-    if split.all().iter().all(still) && levels.iter().all(|level| (level - levels[0]).abs() < 1e-9) {
-        return Some("the voltage never changes: nothing can be told from these data but an offset".into());
+    if split.all().iter().all(is_constant) && levels.iter().all(|level| (level - levels[0]).abs() < 1e-9) {
+        return Some("the voltage is constant and the same in all runs: these data determine no more than an offset".into());
     }
     None
 }
 
+/// The parameters of term `index` with their intervals.
 fn estimates(search: &Search, index: usize, term: &Term, found: &Intervals) -> Vec<Estimate> {
-    let candidate = &search.bench.plant.candidates()[term.candidate];
+    let candidate = &search.estimator.plant.candidates()[term.candidate];
     let first: usize = found.sizes[..index].iter().sum();
     candidate
         .parameters
@@ -399,6 +405,7 @@ fn estimates(search: &Search, index: usize, term: &Term, found: &Intervals) -> V
         .collect()
 }
 
+/// The adopted cause of term `index`, with what it gains on held-out runs.
 fn adopted(
     search: &Search,
     best: &Scored,
@@ -406,9 +413,9 @@ fn adopted(
     term: &Term,
     found: &Intervals,
     tied: &[(usize, Trial)],
-) -> Result<Adopted, String> {
-    let candidate = &search.bench.plant.candidates()[term.candidate];
-    (search.progress)(&format!("what {} is worth", candidate.id));
+) -> Result<Adopted, DiagnoseError> {
+    let candidate = &search.estimator.plant.candidates()[term.candidate];
+    (search.progress)(&format!("the gain of {}", candidate.id));
     let mut without = best.model().clone();
     without.terms.remove(index);
     let without = search.fitted(&without)?;
@@ -417,7 +424,7 @@ fn adopted(
     tied_with.sort();
     tied_with.dedup();
     tied_with.retain(|id| id != candidate.id);
-    // Which actuator it is was found by trying all of them; other given numbers tell the form of the equation.
+    // The actuator was found by trying all of them; other given parameters are the form of the equation.
     let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().copied().partition(|(name, _)| *name == "actuator");
     let which = found_by_trying.into_iter().map(|(name, value)| Estimate {
         name: name.to_owned(),
@@ -439,15 +446,16 @@ fn adopted(
 
 /// Share of the held-out χ² above the noise that `best` removes from `without`.
 fn gain(search: &Search, best: &Scored, without: &Scored) -> f64 {
-    let count = search.bench.count(&search.split.held) as f64;
+    let count = search.estimator.count(&search.split.held) as f64;
     let above = without.held - count;
     if above > 0.0 { ((without.held - best.held) / above).clamp(0.0, 1.0) } else { 0.0 }
 }
 
+/// The refinement as an adopted cause.
 fn discretisation(search: &Search, best: &Scored, coarse: &Scored) -> Adopted {
-    let ladder = search.bench.plant.resolutions();
-    let at = ladder.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
-    let beside = [at.saturating_sub(1), (at + 1).min(ladder.len() - 1)].map(|k| Some(ladder[k]));
+    let resolutions = search.estimator.plant.resolutions();
+    let at = resolutions.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
+    let neighbours = [at.saturating_sub(1), (at + 1).min(resolutions.len() - 1)].map(|k| Some(resolutions[k]));
     Adopted {
         id: "discretisation".into(),
         kind: "numerics".into(),
@@ -456,8 +464,8 @@ fn discretisation(search: &Search, best: &Scored, coarse: &Scored) -> Adopted {
             name: "motors_per_actuator".into(),
             value: best.model().resolution,
             unit: String::new(),
-            ci95: beside,
-            at_bound: at + 1 == ladder.len(),
+            ci95: neighbours,
+            at_bound: at + 1 == resolutions.len(),
         }],
         tied_with: Vec::new(),
         gain_heldout: gain(search, best, coarse),
@@ -465,7 +473,7 @@ fn discretisation(search: &Search, best: &Scored, coarse: &Scored) -> Adopted {
     }
 }
 
-/// Replacements that do as well as the cause they replace.
+/// Replacements that the data cannot tell from the cause they replace.
 fn ties(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_total: f64) -> Vec<(usize, Trial)> {
     let near = |(index, trial): &&(usize, Trial)| {
         best.model().terms.get(*index).is_some_and(|term| search.id(term.candidate) != search.id(trial.candidate))
@@ -480,6 +488,7 @@ fn ties(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_tota
     replaced.iter().filter(near).filter_map(again).collect()
 }
 
+/// Root mean square residual of runs, in the plant's unit.
 fn rmse(plant: &dyn Plant, used: &[Vec<bool>], residuals: &[Residuals], runs: &[usize]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for &run in runs {
@@ -493,6 +502,7 @@ fn rmse(plant: &dyn Plant, used: &[Vec<bool>], residuals: &[Residuals], runs: &[
     if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
 }
 
+/// Errors and residual tests of a model.
 fn stage(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], scored: &Scored, parameters: Vec<Estimate>) -> Stage {
     let all = split.all();
     let runs = all.iter().map(|&run| {

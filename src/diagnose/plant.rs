@@ -1,29 +1,31 @@
-//! What the loop knows of the thing that was measured: parameters and conditions in, predicted signals out.
+//! A measured system with its model: parameters in, predicted signals out.
 
-/// A number that a fit may change. Internally it is a coordinate in which the effect vanishes at a finite value.
+use super::DiagnoseError;
+
+/// A fitted parameter. The fit uses a coordinate, the value or its inverse, in which the effect vanishes at a finite point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Free {
     /// Its name in reports and files.
     pub name: &'static str,
-    /// Unit, empty for plain numbers.
+    /// Unit of the value; empty for dimensionless ones.
     pub unit: &'static str,
-    /// Coordinate at which it does nothing; none if it cannot switch its effect off.
+    /// Coordinate at which the effect vanishes; none if the parameter cannot switch it off.
     pub off: Option<f64>,
     /// Range of the coordinate.
     pub bounds: [f64; 2],
-    /// A usual size of a change of the coordinate: the step of finite differences is a part of it.
+    /// Typical change of the coordinate, to which the step of finite differences is proportional.
     pub scale: f64,
-    /// Whether the coordinate is 1/value.
+    /// True if the coordinate is 1/value.
     pub inverse: bool,
 }
 
 impl Free {
-    /// The value that a coordinate stands for.
+    /// The value at a coordinate.
     pub fn value(&self, coordinate: f64) -> f64 {
         if !self.inverse {
             coordinate
         } else if coordinate == 0.0 {
-            // Whatever the sign of zero: the side on which the bounds lie.
+            // The sign is that of the bounds, not of the zero.
             if self.bounds[0] < 0.0 { f64::NEG_INFINITY } else { f64::INFINITY }
         } else {
             1.0 / coordinate
@@ -34,60 +36,60 @@ impl Free {
 /// A cause that may be added to the model.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Its name. Forms of one cause, which exclude one another, share it.
+    /// Its name, shared by the mutually exclusive forms of a cause.
     pub id: &'static str,
     /// Where it acts.
     pub kind: &'static str,
     /// The cause in a sentence.
     pub cause: &'static str,
-    /// A constant of the nominal model: fitted before physics is blamed.
+    /// True for a constant of the nominal model, which is fitted before other causes are tried.
     pub is_constant: bool,
-    /// What is fitted.
+    /// Fitted parameters.
     pub parameters: Vec<Free>,
-    /// Parameters that are given.
+    /// Given parameters: name and value.
     pub fixed: Vec<(&'static str, f64)>,
-    /// Coordinates to start from: one of them should be near enough.
+    /// Starting coordinates, starts × parameters; the fit should converge from one of them.
     pub starts: Vec<Vec<f64>>,
 }
 
-/// A cause with coordinates.
+/// A candidate with coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Index of the candidate.
+    /// Index into [`Plant::candidates`].
     pub candidate: usize,
     /// One coordinate per parameter.
     pub x: Vec<f64>,
 }
 
-/// A model: the nominal one with causes added, and its discretisation.
+/// The nominal model with causes added, and its discretisation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// Causes beside the nominal model.
+    /// Causes added to the nominal model.
     pub terms: Vec<Term>,
-    /// As in [`Plant::resolutions`].
+    /// One of [`Plant::resolutions`].
     pub resolution: f64,
-    /// Whether numbers are to be trusted to the last: half the time step.
+    /// True for half the time step, as in the final refit.
     pub fine: bool,
 }
 
-/// One run as measured, without what is missing or was found to be damaged.
+/// A measured run without missing and unusable values.
 #[derive(Debug, Clone)]
 pub struct Signal {
     /// Its name.
     pub id: String,
-    /// Measured values, channel after channel.
+    /// Measured values, in the plant's unit, channel after channel.
     pub values: Vec<f64>,
-    /// One standard deviation of each.
+    /// Standard deviation of each value, in the plant's unit.
     pub sigmas: Vec<f64>,
-    /// When (s).
+    /// Time of each value (s).
     pub times: Vec<f64>,
-    /// Which channel.
+    /// Channel of each value.
     pub channels: Vec<usize>,
-    /// The input at that time, of the plant's first actuator.
+    /// Input of the first actuator at the time of each value (V for robots).
     pub inputs: Vec<f64>,
 }
 
-/// A thing whose behaviour was measured in runs and can be predicted.
+/// A system that was measured in runs and can be simulated.
 pub trait Plant: Sync {
     /// The measured runs.
     fn signals(&self) -> &[Signal];
@@ -95,30 +97,30 @@ pub trait Plant: Sync {
     /// Names of the channels.
     fn channels(&self) -> Vec<String>;
 
-    /// Unit of the signals.
+    /// Unit of all signals.
     fn unit(&self) -> &'static str;
 
-    /// All causes that may be tried.
+    /// All candidate causes.
     fn candidates(&self) -> &[Candidate];
 
-    /// Discretisations from the nominal one (first) on, finer and finer; more than one if refining can matter.
+    /// Discretisations (elements or joints) in rising order, the nominal one first; one where refinement does not matter.
     fn resolutions(&self) -> Vec<f64> {
         vec![1.0]
     }
 
-    /// Number of nuisances that belong to a run and not to the model, such as moments of jumps between two samples. They lie between 0 and 1.
+    /// Number of nuisance parameters of a run, such as times of jumps between two samples. Each lies between 0 and 1.
     fn nuisances(&self, _run: usize) -> usize {
         0
     }
 
-    /// Whether a cause does more than what the discretisation leaves open.
+    /// True if a term exceeds the error of the discretisation.
     fn is_credible(&self, _term: &Term, _resolution: f64) -> bool {
         true
     }
 
-    /// The signal of `run` as predicted by `model`, at the times and channels of the measured one.
+    /// The values that `model` predicts for `run`, in the order and unit of [`Signal::values`].
     ///
     /// # Errors
-    /// Why it cannot be predicted, in words.
-    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Vec<f64>, String>;
+    /// [`DiagnoseError`] if the model cannot be simulated; [`DiagnoseError::Plant`] takes any error or text.
+    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError>;
 }

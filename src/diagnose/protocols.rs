@@ -1,28 +1,31 @@
-//! What to measure next: tied models simulated under a list of protocols, and the one that tells them apart best.
+//! Choice of the next measurement: tied models are simulated under a list of protocols, and the one that separates them best is proposed.
 
 use super::plant::Model;
 use super::robot::{RobotPlant, Scene};
 use crate::drive::Table;
 use crate::model::Mount;
 
-/// Rows of a simulated protocol.
+/// Rows of a simulated protocol, and rows of its voltages.
 const ROWS: usize = 400;
+const VOLTAGE_ROWS: usize = 2000;
+/// Least distance of two models (σ, all rows together) that a measurement can tell.
+const LEAST_DISTANCE: f64 = 3.0;
 
 /// An experiment that could be made.
 struct Protocol {
-    /// What to do, in words.
+    /// Instructions in words.
     text: String,
     scene: Scene,
 }
 
-/// A table of voltages by a function of time, equal or one by one.
+/// Voltages (V) given as a function of time (s) and actuator.
 fn table(actuators: usize, duration: f64, volts: impl Fn(f64, usize) -> f64) -> Table {
-    let rows = 2000;
-    let times: Vec<f64> = (0..=rows).map(|i| duration * i as f64 / rows as f64).collect();
+    let times: Vec<f64> = (0..=VOLTAGE_ROWS).map(|i| duration * i as f64 / VOLTAGE_ROWS as f64).collect();
     let values = times.iter().flat_map(|t| (0..actuators).map(|a| volts(*t, a)).collect::<Vec<_>>()).collect();
     Table::new(times, values, actuators).unwrap_or_else(|_| unreachable!("times rise and values are finite"))
 }
 
+/// The protocols for a robot.
 fn protocols(plant: &RobotPlant) -> Vec<Protocol> {
     let robot = plant.robot();
     let n = robot.actuators;
@@ -92,8 +95,7 @@ fn protocols(plant: &RobotPlant) -> Vec<Protocol> {
     list
 }
 
-/// The protocol under which two tied models differ most, with how much that is; none for fewer than two models, or if no protocol of the list
-/// helps.
+/// The protocol that separates tied models best, in words, with the distance of the two nearest ones (σ); none for fewer than two models.
 pub fn separate(plant: &RobotPlant, models: &[Model]) -> Option<String> {
     let [first, others @ ..] = models else { return None };
     if others.is_empty() {
@@ -102,24 +104,24 @@ pub fn separate(plant: &RobotPlant, models: &[Model]) -> Option<String> {
     let noise = plant.noise();
     let mut best: Option<(f64, String)> = None;
     for protocol in protocols(plant) {
-        let Ok(plain) = plant.play(first, &protocol.scene, ROWS) else { continue };
-        // The pair that is hardest to tell apart decides.
-        let apart = others.iter().filter_map(|other| {
-            let there = plant.play(other, &protocol.scene, ROWS).ok()?;
-            let sum: f64 = plain.iter().zip(&there).map(|(a, b)| ((a - b) / noise).powi(2)).sum();
+        let Ok(first) = plant.simulate(first, &protocol.scene, ROWS) else { continue };
+        // The model nearest to the first decides.
+        let distances = others.iter().filter_map(|other| {
+            let other = plant.simulate(other, &protocol.scene, ROWS).ok()?;
+            let sum: f64 = first.iter().zip(&other).map(|(a, b)| ((a - b) / noise).powi(2)).sum();
             Some(sum.sqrt())
         });
-        let least = apart.fold(f64::INFINITY, f64::min);
+        let least = distances.fold(f64::INFINITY, f64::min);
         if least.is_finite() && best.as_ref().is_none_or(|(most, _)| least > *most) {
             best = Some((least, protocol.text));
         }
     }
-    let (apart, text) = best?;
-    if apart < 3.0 {
+    let (distance, text) = best?;
+    if distance < LEAST_DISTANCE {
         return Some(
             "no experiment of the program's list separates them; log the electrode's voltage on the camera's clock, and measure mass and force directly"
                 .into(),
         );
     }
-    Some(format!("{text}: the models then differ by {apart:.0} standard deviations"))
+    Some(format!("{text}: the models then differ by {distance:.0} standard deviations"))
 }

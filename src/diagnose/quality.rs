@@ -1,32 +1,31 @@
-//! What of the data can be used: noise, outliers, frozen markers.
+//! Data quality: noise, outliers and frozen markers.
 
 use super::dataset::{Dataset, MeasuredRun};
 use crate::model::Mount;
 
-/// A value is an outlier if it lies so many times the noise of the difference off the cubic through its four neighbours. With normal noise one
-/// value in 10⁸ does.
+/// Outliers differ from the cubic through their four neighbours by more than this (in σ of the difference): one value in 10⁸ of normal noise.
 const OUTLIER: f64 = 6.0;
-/// The same value so many times in a row is a frozen marker; a moving one with noise repeats no digit that often.
+/// Rows with one and the same value that make a frozen marker.
 const FROZEN: usize = 12;
-/// Noise of the fourth difference y − (−y₋₂ + 4 y₋₁ + 4 y₊₁ − y₊₂)/6 of independent values, as a multiple of theirs: √(1 + 34/36).
+/// Standard deviation of y − (−y₋₂ + 4 y₋₁ + 4 y₊₁ − y₊₂)/6 for independent values of unit variance: √(1 + 34/36).
 const DIFFERENCE_NOISE: f64 = 1.394_433_377_556_793;
-/// The median of |x| of a normal variable of unit variance.
+/// Median of |x| for a standard normal x.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
 /// Noise and masks of a data set.
 #[derive(Debug, Clone)]
 pub struct Checked {
-    /// One standard deviation per channel (mm).
+    /// Standard deviation of each channel (mm): the given one, or the estimate.
     pub noise: Vec<f64>,
-    /// The same as estimated from the data, whether given or not.
+    /// Standard deviation of each channel estimated from the data (mm); 0 if there are too few rows.
     pub estimated: Vec<f64>,
-    /// Per run and channel: which rows can be used.
+    /// True for usable values, runs × channels × rows.
     pub runs: Vec<Vec<Vec<bool>>>,
-    /// What was left out or looks odd, in words.
+    /// Remarks on what was masked or is unusual, in words.
     pub remarks: Vec<String>,
 }
 
-/// Differences of every value from the cubic through its four neighbours, where rows are even enough and present.
+/// Difference of each value from the cubic through its four neighbours; none at uneven or missing rows.
 fn differences(times: &[f64], y: &[f64]) -> Vec<Option<f64>> {
     let n = y.len();
     let at = |i: usize| {
@@ -49,7 +48,12 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Looks at all runs of a data set.
+/// The median interval (s) between rows; none for fewer than two.
+pub(super) fn median_interval(times: &[f64]) -> Option<f64> {
+    median(times.windows(2).map(|pair| pair[1] - pair[0]).collect())
+}
+
+/// Estimates the noise of a data set and masks its unusable values.
 pub fn check(dataset: &Dataset) -> Checked {
     let names = dataset.channel_names();
     let mut remarks: Vec<String> = Vec::new();
@@ -58,7 +62,7 @@ pub fn check(dataset: &Dataset) -> Checked {
     }
     let mut estimated = Vec::new();
     for channel in 0..names.len() {
-        // Each run's own estimate; motion can only raise it, so the lower half counts.
+        // Motion can only raise a run's estimate, so a low quantile of all runs counts.
         let of_run = |run: &MeasuredRun| {
             let d = differences(&run.times, run.channels.get(channel)?).into_iter().flatten().map(f64::abs).collect::<Vec<_>>();
             if d.len() < 20 { None } else { median(d).map(|d| d / MEDIAN_OF_NORMAL / DIFFERENCE_NOISE) }
@@ -95,9 +99,9 @@ pub fn check(dataset: &Dataset) -> Checked {
         let mut masks = Vec::new();
         for (channel, y) in run.channels.iter().enumerate() {
             let scatter = noise[channel].max(estimated[channel]);
-            let mut good: Vec<bool> = y.iter().map(|value| value.is_finite()).collect();
-            let outliers = remove_outliers(&run.times, y, &mut good, scatter);
-            let frozen = remove_frozen(y, &mut good);
+            let mut usable: Vec<bool> = y.iter().map(|value| value.is_finite()).collect();
+            let outliers = remove_outliers(&run.times, y, &mut usable, scatter);
+            let frozen = remove_frozen(y, &mut usable);
             let name = &names[channel];
             if outliers > 0 {
                 remarks.push(format!("run {}: {outliers} outliers of {name} left out", run.id));
@@ -105,9 +109,9 @@ pub fn check(dataset: &Dataset) -> Checked {
             if frozen > 0 {
                 remarks.push(format!("run {}: {name} stands still for {frozen} rows, which are left out", run.id));
             }
-            masks.push(good);
+            masks.push(usable);
         }
-        // A foot on the floor may well stand still while the rest moves.
+        // On the ground a foot may rest while the others move.
         let stuck = if dataset.robot.mount == Mount::Ground { Vec::new() } else { stuck(run, &noise, &mut masks) };
         for (channel, rows) in stuck {
             remarks.push(format!(
@@ -120,8 +124,8 @@ pub fn check(dataset: &Dataset) -> Checked {
     Checked { noise, estimated, runs, remarks }
 }
 
-/// Takes out values far off their neighbours, the worst first, since each spoils its neighbours' differences.
-fn remove_outliers(times: &[f64], y: &[f64], good: &mut [bool], noise: f64) -> usize {
+/// Masks outliers, the worst first, since each raises its neighbours' differences. Returns their number.
+fn remove_outliers(times: &[f64], y: &[f64], usable: &mut [bool], noise: f64) -> usize {
     let mut work: Vec<f64> = y.to_vec();
     let limit = OUTLIER * DIFFERENCE_NOISE * noise;
     let mut count = 0;
@@ -130,25 +134,26 @@ fn remove_outliers(times: &[f64], y: &[f64], good: &mut [bool], noise: f64) -> u
         let size = |i: usize| d.get(i).copied().flatten().unwrap_or(0.0);
         let worst = (0..y.len()).filter(|i| size(*i).abs() > limit).max_by(|a, b| size(*a).abs().total_cmp(&size(*b).abs()));
         let Some(i) = worst else { break };
-        // Alone, its neighbours' differences are −2/3 and 1/6 of its own.
-        let like = |k: usize, share: f64| (size(k) / size(i) - share).abs() < 0.3;
-        let alone = like(i - 1, -2.0 / 3.0) && like(i + 1, -2.0 / 3.0) && like(i - 2, 1.0 / 6.0) && like(i + 2, 1.0 / 6.0);
-        let bridge = (4.0 * (work[i - 1] + work[i + 1]) - work[i - 2] - work[i + 2]) / 6.0;
-        // Where the motion itself is too fast for the rows, differences are large all around.
+        // A single outlier gives its neighbours −2/3 and 1/6 of its own difference.
+        let is_near = |k: usize, share: f64| (size(k) / size(i) - share).abs() < 0.3;
+        let is_single =
+            is_near(i - 1, -2.0 / 3.0) && is_near(i + 1, -2.0 / 3.0) && is_near(i - 2, 1.0 / 6.0) && is_near(i + 2, 1.0 / 6.0);
+        let interpolated = (4.0 * (work[i - 1] + work[i + 1]) - work[i - 2] - work[i + 2]) / 6.0;
+        // Motion that is too fast for the rows makes all differences large.
         let around: Vec<f64> = (3..9).flat_map(|k| [i.checked_sub(k), Some(i + k)]).flatten().map(|k| size(k).abs()).collect();
-        let quiet = median(around).is_none_or(|around| size(i).abs() > 4.0 * around);
-        if alone && quiet && good[i] {
-            good[i] = false;
+        let is_smooth_around = median(around).is_none_or(|around| size(i).abs() > 4.0 * around);
+        if is_single && is_smooth_around && usable[i] {
+            usable[i] = false;
             count += 1;
         }
-        // Bridged either way, so that the next worst is looked at.
-        work[i] = bridge;
+        // Interpolated in any case, so that the next worst follows.
+        work[i] = interpolated;
     }
     count
 }
 
-/// Takes out stretches of one and the same value.
-fn remove_frozen(y: &[f64], good: &mut [bool]) -> usize {
+/// Masks [`FROZEN`] or more equal values in a row. Returns their number.
+fn remove_frozen(y: &[f64], usable: &mut [bool]) -> usize {
     let mut count = 0;
     let mut from = 0;
     for i in 1..=y.len() {
@@ -156,7 +161,7 @@ fn remove_frozen(y: &[f64], good: &mut [bool]) -> usize {
             continue;
         }
         if i - from >= FROZEN {
-            good[from..i].fill(false);
+            usable[from..i].fill(false);
             count += i - from;
         }
         from = i;
@@ -164,7 +169,7 @@ fn remove_frozen(y: &[f64], good: &mut [bool]) -> usize {
     count
 }
 
-/// Stretches in which a channel scatters like noise while the same axis of another marker moves by far more.
+/// Masks windows in which a channel scatters like noise while the same axis of another marker moves far more. Returns channels and numbers of rows.
 fn stuck(run: &MeasuredRun, noise: &[f64], masks: &mut [Vec<bool>]) -> Vec<(usize, usize)> {
     const WINDOW: usize = 40;
     let spread = |y: &[f64]| {
@@ -179,13 +184,13 @@ fn stuck(run: &MeasuredRun, noise: &[f64], masks: &mut [Vec<bool>]) -> Vec<(usiz
             let window = from..from + WINDOW;
             let Some(own) = run.channels[channel].get(window.clone()) else { continue };
             let moves = (channel % 2..run.channels.len()).step_by(2).any(|other| {
-                // A marker nearer to the left end may well move a tenth of what one further out does.
+                // A marker near the left end may move a tenth of one further out.
                 other != channel && run.channels[other].get(window.clone()).is_some_and(|y| spread(y) > 60.0 * noise[other])
             });
             if moves && spread(own) < 1.6 * noise[channel] {
-                for good in &mut masks[channel][window] {
-                    rows += usize::from(*good);
-                    *good = false;
+                for usable in &mut masks[channel][window] {
+                    rows += usize::from(*usable);
+                    *usable = false;
                 }
             }
         }

@@ -1,43 +1,44 @@
-//! The diagnosis as one self-contained page, read from the verdict down.
+//! The diagnosis as one self-contained page: the verdict first, then its evidence.
 
 use std::fmt::Write;
 
 use super::diagnosis::{Diagnosis, Stage, Verdict, failing};
-use super::fit::Residuals;
+use super::fit::sum_of_squares;
 use super::names;
 use super::picture;
 use super::pipeline::Outcome;
 use super::plant::{Plant, Signal};
+use super::residual_tests::{ResidualTest, rows_by_channel, sum_over};
 use crate::model::Robot;
 use crate::view::page::{Cell, HALF, Table, document, figure};
 use crate::view::{Figure, Mark, digits_for, escape, fixed, minus, signed, significant};
 
-/// Runs that are drawn, and rows of each at most.
+/// Runs that are drawn, and most rows of each.
 const RUNS: usize = 3;
 const ROWS: usize = 700;
-/// Candidates that are listed.
+/// Most candidates in the table.
 const CANDIDATES: usize = 12;
-/// Residuals of a run that are larger than the noise by more than this are marked.
+/// Least root mean sum_of_squares residual of a run (σ) that is marked.
 const LARGE: f64 = 1.2;
 
-/// What a report needs beside the outcome.
+/// The report's inputs other than the outcome.
 pub struct Context<'a> {
     /// The plant.
     pub plant: &'a dyn Plant,
-    /// The nominal robot, whose constants are named.
+    /// The nominal robot, for the values of its constants.
     pub robot: &'a Robot,
-    /// The command that makes it again.
+    /// The command that reproduces the report.
     pub command: &'a str,
-    /// The extended experiment, as text.
+    /// The extended experiment (TOML).
     pub extended: &'a str,
 }
 
-/// A text of the diagnosis as it stands on a page.
+/// A text of the diagnosis as HTML.
 pub(super) fn prose(text: &str) -> String {
     escape(&minus(text))
 }
 
-/// Title and verdict, which every page of a diagnosis begins with.
+/// Title and verdict.
 pub(super) fn heading(d: &Diagnosis) -> String {
     let fails = failing(&d.extended.residual_tests).is_some();
     let verdict = match (d.verdict, fails) {
@@ -56,7 +57,7 @@ pub(super) fn heading(d: &Diagnosis) -> String {
     )
 }
 
-/// The page.
+/// The page (HTML).
 pub fn page(outcome: &Outcome, context: &Context) -> String {
     let d = &outcome.diagnosis;
     let unit = context.plant.unit();
@@ -74,20 +75,19 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
     }
     gain(&mut out, d, unit);
     let mut order = outcome.split.all();
-    let square = |residuals: &[Residuals], run: usize| residuals[run].iter().map(|r| r * r).sum::<f64>();
-    order.sort_by(|a, b| square(&outcome.calibrated.residuals, *b).total_cmp(&square(&outcome.calibrated.residuals, *a)));
+    let chi2 = |run: &usize| sum_of_squares(&outcome.calibrated.residuals[*run]);
+    order.sort_by(|a, b| chi2(b).total_cmp(&chi2(a)));
     order.truncate(RUNS);
+    let channels: Vec<usize> = order.iter().map(|run| largest_channel(outcome, context.plant, *run)).collect();
     out.push_str("<h2>Measured and simulated, before and after</h2>\n");
-    for (index, run) in order.iter().enumerate() {
+    for (index, (run, &channel)) in order.iter().zip(&channels).enumerate() {
         let signal = &context.plant.signals()[*run];
-        let channel = loudest(signal, &outcome.nominal.residuals[*run]);
         let name = context.plant.channels().get(channel).cloned().unwrap_or_default();
         motion(&mut out, outcome, *run, signal, channel, &format!("{} ({unit})", name.replace('_', " ")), index);
     }
     out.push_str("<h2>Residuals, before and after</h2>\n");
-    for (index, run) in order.iter().enumerate() {
+    for (index, (run, &channel)) in order.iter().zip(&channels).enumerate() {
         let signal = &context.plant.signals()[*run];
-        let channel = loudest(signal, &outcome.nominal.residuals[*run]);
         residuals(&mut out, outcome, *run, signal, channel, index);
     }
     ranking(&mut out, d, unit);
@@ -146,16 +146,14 @@ fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
     out.push_str(&table.html());
 }
 
-/// The channel with the largest residual.
-fn loudest(signal: &Signal, residuals: &[f64]) -> usize {
-    let channels = signal.channels.iter().copied().max().unwrap_or(0) + 1;
-    let size = |channel: usize| -> f64 {
-        residuals.iter().zip(&signal.channels).filter(|(_, c)| **c == channel).map(|(r, _)| r * r).sum()
-    };
-    (0..channels).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
+/// The channel of a run with the largest residuals of the nominal model.
+fn largest_channel(outcome: &Outcome, plant: &dyn Plant, run: usize) -> usize {
+    let rows = rows_by_channel(&plant.signals()[run], &outcome.used[run]);
+    let chi2 = |channel: usize| sum_over(&outcome.nominal.residuals[run], &rows[channel]);
+    (0..rows.len()).max_by(|a, b| chi2(*a).total_cmp(&chi2(*b))).unwrap_or(0)
 }
 
-/// Rows of a channel, thinned out.
+/// Rows of a channel, at most [`ROWS`].
 fn rows(signal: &Signal, channel: usize) -> Vec<usize> {
     let rows: Vec<usize> = (0..signal.values.len()).filter(|i| signal.channels[*i] == channel).collect();
     let every = rows.len().div_ceil(ROWS).max(1);
@@ -242,7 +240,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         );
     }
     out.push_str("<h3>Constants of the nominal model, re-tuned alone</h3>\n");
-    // The estimates stand in the order of the model's terms.
+    // Estimates are in the order of the model's terms.
     let terms = &outcome.calibrated.model().terms;
     let ids = terms.iter().flat_map(|term| {
         let candidate = &context.plant.candidates()[term.candidate];
@@ -304,13 +302,13 @@ fn tests(out: &mut String, d: &Diagnosis) {
     );
     let models = [("nominal", &d.baseline), ("re-tuned", &d.calibrated), ("extended", &d.extended)];
     let picture = picture::residual_tests(&models.map(|(name, stage)| (name, stage.residual_tests.as_slice())));
-    let caption = "A row for each run, a column for each test; crossed where the residuals are not noise. Size: chi-square per value. Neighbours, input, \
+    let caption = "A row for each run, a column for each test; crossed where the residuals are not noise. Size: chi-sum_of_squares per value. Neighbours, input, \
                    input's rate: correlation with them. The others are named in full below.";
     out.push_str(&figure("tests", "wide", &picture, caption));
     let mut table =
         Table::new(&["run", "test", "#nominal", "#re-tuned", "#extended", "#limit", "what it means, before and after"]);
     for ((a, b), c) in d.baseline.residual_tests.iter().zip(&d.calibrated.residual_tests).zip(&d.extended.residual_tests) {
-        let cell = |test: &super::residual_tests::ResidualTest| Cell::from(fixed(test.statistic, 3)).bad_if(!test.passed);
+        let cell = |test: &ResidualTest| Cell::from(fixed(test.statistic, 3)).bad_if(!test.passed);
         let meaning = if a.meaning == c.meaning { a.meaning.clone() } else { format!("{}; then {}", a.meaning, c.meaning) };
         table.row([
             a.run.as_str().into(),

@@ -1,14 +1,14 @@
-//! What residuals look like: tests with their statistics, and what they mean in words.
+//! Residual tests: statistics of the residuals, with limits that noise alone exceeds once in a thousand, and their meaning in words.
 
 use std::f64::consts::PI;
 
 use serde::Serialize;
 
-use super::fit::Residuals;
+use super::fit::{Residuals, inner};
 use super::plant::{Plant, Signal};
 use super::search::Split;
 
-/// A test of the residuals.
+/// A test of a run's residuals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResidualTest {
     /// Its name.
@@ -17,26 +17,29 @@ pub struct ResidualTest {
     pub run: String,
     /// The statistic.
     pub statistic: f64,
-    /// The value that noise alone exceeds in about one case of a thousand.
+    /// The limit, which noise alone exceeds once in about a thousand.
     pub limit: f64,
-    /// Whether the residuals pass as noise.
+    /// True if the statistic is within the limit.
     pub passed: bool,
     /// What the statistic means, in words.
     pub meaning: String,
 }
 
-/// Residuals of one channel of one run, with times and inputs.
+/// Residuals of one channel of one run.
 struct Trace {
+    /// Times (s).
     times: Vec<f64>,
+    /// Inputs, in the plant's unit.
     inputs: Vec<f64>,
+    /// Residuals (σ).
     values: Vec<f64>,
 }
 
-/// Fewest values that are tested.
+/// Fewest values of a tested channel.
 const LEAST: usize = 20;
 
-/// Which rows of each channel count.
-fn rows_by_channel(signal: &Signal, used: &[bool]) -> Vec<Vec<usize>> {
+/// Indices of the used values of each channel.
+pub(super) fn rows_by_channel(signal: &Signal, used: &[bool]) -> Vec<Vec<usize>> {
     let channels = signal.channels.iter().copied().max().map_or(0, |most| most + 1);
     let mut rows = vec![Vec::new(); channels];
     for (i, channel) in signal.channels.iter().enumerate().filter(|(i, _)| used[*i]) {
@@ -45,14 +48,18 @@ fn rows_by_channel(signal: &Signal, used: &[bool]) -> Vec<Vec<usize>> {
     rows
 }
 
-/// The channel with the largest residual of those with enough values, without values that were left out; and the channel with most values, whose
-/// times and inputs do not depend on the residuals. What is computed from a trace must not depend on its size, by which it is chosen.
+/// Sum of squared residuals over `rows`.
+pub(super) fn sum_over(residuals: &[f64], rows: &[usize]) -> f64 {
+    rows.iter().map(|i| residuals[*i] * residuals[*i]).sum()
+}
+
+/// Of the channels with enough used values, the one with the largest mean square residual, and the one with most values, whose times and inputs do
+/// not depend on the residuals. Statistics of the first must not depend on its size, by which it is chosen.
 fn trace(signal: &Signal, used: &[bool], residuals: &[f64]) -> Option<[Trace; 2]> {
     let mut rows = rows_by_channel(signal, used);
     rows.retain(|rows| rows.len() >= LEAST);
-    let size =
-        |rows: &&Vec<usize>| -> f64 { rows.iter().map(|i| residuals[*i] * residuals[*i]).sum::<f64>() / rows.len() as f64 };
-    let chosen = rows.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let mean_square = |rows: &&Vec<usize>| sum_over(residuals, rows) / rows.len() as f64;
+    let chosen = rows.iter().max_by(|a, b| mean_square(a).total_cmp(&mean_square(b)))?;
     let longest = rows.iter().max_by_key(|rows| rows.len())?;
     Some([chosen, longest].map(|rows| Trace {
         times: rows.iter().map(|i| signal.times[*i]).collect(),
@@ -65,7 +72,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Coefficient of correlation of two series; 0 where one is constant.
+/// Correlation coefficient of two series; 0 if one is constant.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (ma, mb) = (mean(a), mean(b));
     let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
@@ -77,7 +84,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
 }
 
-/// Amplitude of a series at a frequency, by least squares with a constant; in the series' unit.
+/// Amplitude of a series at a frequency (Hz), in the series' unit.
 fn amplitude(times: &[f64], values: &[f64], frequency: f64) -> f64 {
     let m = mean(values);
     let (mut c, mut s) = (0.0, 0.0);
@@ -88,7 +95,7 @@ fn amplitude(times: &[f64], values: &[f64], frequency: f64) -> f64 {
     2.0 * c.hypot(s) / values.len().max(1) as f64
 }
 
-/// Frequency of a periodic input (Hz), from where it rises through its middle; none for fewer than three rises.
+/// Frequency (Hz) of a periodic input at `times` (s), from its rises through the middle of its range; none for fewer than three.
 pub fn input_frequency(times: &[f64], inputs: &[f64]) -> Option<f64> {
     let (low, high) = inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), u| (l.min(*u), h.max(*u)));
     let middle = 0.5 * (low + high);
@@ -105,12 +112,12 @@ pub fn input_frequency(times: &[f64], inputs: &[f64]) -> Option<f64> {
     (count >= 3).then(|| (count - 1) as f64 / (rises[count - 1] - rises[0]))
 }
 
-/// The standard normal variable that noise exceeds, on either side, in one case of a thousand, and on one side.
+/// Standard normal quantiles that are exceeded once in a thousand, on either side and on one side.
 const Z_TWO_SIDED: f64 = 3.290_526_731_491_9;
 const Z_ONE_SIDED: f64 = 3.090_232_306_167_8;
 
-/// Student's t that noise exceeds, on either side, in one case of a thousand: Cornish and Fisher's expansion (M. Abramowitz and I. A. Stegun,
-/// 26.7.5), right to 10⁻³ from 17 degrees of freedom on.
+/// Student's t that is exceeded, on either side, once in a thousand: Cornish and Fisher's expansion (M. Abramowitz and I. A. Stegun, 26.7.5), with an
+/// error below 10⁻³ from 17 degrees of freedom on.
 fn student(freedom: f64) -> f64 {
     let (z, n) = (Z_TWO_SIDED, freedom);
     let [z3, z5, z7] = [3, 5, 7].map(|power| z.powi(power));
@@ -119,22 +126,21 @@ fn student(freedom: f64) -> f64 {
         + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n * n * n)
 }
 
-/// The coefficient of correlation that noise exceeds in one case of a thousand.
+/// Correlation coefficient that noise exceeds once in a thousand.
 fn correlation_limit(values: usize) -> f64 {
     let freedom = values as f64 - 2.0;
     let t = student(freedom);
     t / (freedom + t * t).sqrt()
 }
 
-/// χ² per value that noise exceeds in one case of a thousand, by Wilson and Hilferty's approximation.
+/// χ² per value that noise exceeds once in a thousand, by Wilson and Hilferty's approximation.
 fn chi2_limit(values: f64) -> f64 {
     let spread = 2.0 / (9.0 * values);
     (1.0 - spread + Z_ONE_SIDED * spread.sqrt()).powi(3)
 }
 
-/// Amplitude of a series at a frequency beside a mean, by least squares, with the amplitude that noise of the strength of the rest exceeds in one case of
-/// a thousand: √(2 S/m) with S the sum of squares that the sine takes of m values; of k = 2 coordinates (1 where sine and cosine are alike at the
-/// rows) S/k over the mean square of the rest has Fisher's distribution.
+/// Amplitude of a trace at a frequency (Hz) by least squares, √(2 S/m) with S the sum of squares that sine and cosine explain of m values, and its
+/// limit by Fisher's distribution of S/k over the mean square of the rest, for k = 2 coordinates (1 if sine and cosine are collinear at the rows).
 fn harmonic(trace: &Trace, frequency: f64) -> (f64, f64) {
     let m = trace.values.len() as f64;
     let centred = |mut values: Vec<f64>| {
@@ -142,11 +148,10 @@ fn harmonic(trace: &Trace, frequency: f64) -> (f64, f64) {
         values.iter_mut().for_each(|v| *v -= mean);
         values
     };
-    let inner = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let phases = trace.times.iter().map(|t| 2.0 * PI * frequency * (t - trace.times[0]));
     let (cos, sin): (Vec<f64>, Vec<f64>) = phases.map(|phase| (phase.cos(), phase.sin())).unzip();
     let values = centred(trace.values.clone());
-    let (mut taken, mut basis): (f64, Vec<Vec<f64>>) = (0.0, Vec::new());
+    let (mut explained, mut basis): (f64, Vec<Vec<f64>>) = (0.0, Vec::new());
     for wave in [centred(cos), centred(sin)] {
         let mut rest = wave;
         for other in &basis {
@@ -156,22 +161,22 @@ fn harmonic(trace: &Trace, frequency: f64) -> (f64, f64) {
         let size = inner(&rest, &rest).sqrt();
         if size * size > 1e-6 * m {
             rest.iter_mut().for_each(|rest| *rest /= size);
-            taken += inner(&rest, &values).powi(2);
+            explained += inner(&rest, &values).powi(2);
             basis.push(rest);
         }
     }
     let k = basis.len() as f64;
     let freedom = m - 1.0 - k;
-    let left = (inner(&values, &values) - taken).max(0.0) / freedom;
+    let left = (inner(&values, &values) - explained).max(0.0) / freedom;
     let limit = match basis.len() {
         0 => return (0.0, 0.0),
         1 => student(freedom).powi(2),
         _ => freedom * (1000_f64.powf(2.0 / freedom) - 1.0),
     };
-    ((2.0 * taken / m).sqrt(), (2.0 * limit * left / m).sqrt())
+    ((2.0 * explained / m).sqrt(), (2.0 * limit * left / m).sqrt())
 }
 
-/// All tests on all runs, and those across runs, on the values that are `used`. Which tests there are does not depend on the residuals.
+/// All residual tests, of each run and across runs, on the values that are `used`. The list of tests does not depend on the residuals (σ).
 pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<ResidualTest> {
     let mut tests = Vec::new();
     let (mut gains, mut runs) = (Vec::new(), 0);
@@ -201,10 +206,10 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], resi
         add("correlation with the input", along, limit, "independent of the input", "follows the input: a gain is off");
         let ends = trace.inputs.windows(2).zip(trace.times.windows(2));
         let rates: Vec<f64> = ends.map(|(u, t)| (u[1] - u[0]) / (t[1] - t[0])).collect();
-        let beside = correlation(&trace.values[1..], &rates);
+        let with_rate = correlation(&trace.values[1..], &rates);
         add(
             "correlation with the input's rate",
-            beside,
+            with_rate,
             correlation_limit(m - 1),
             "independent of the rate",
             "follows the rate of the input: a lag, a loop or a loss is off",
@@ -251,7 +256,7 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], resi
     tests
 }
 
-/// The input's swing, measured over simulated motion about its mean, and the reciprocal variance of that: by least squares, for noise of unit variance.
+/// The input's range, the gain of measured over simulated motion about the mean (by least squares), and the gain's inverse variance.
 fn gain(signal: &Signal, used: &[bool], residuals: &[f64]) -> Option<[f64; 3]> {
     let (mut product, mut spread) = (0.0, 0.0);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -268,13 +273,13 @@ fn gain(signal: &Signal, used: &[bool], residuals: &[f64]) -> Option<[f64; 3]> {
     (spread > 0.0).then(|| [high - low, 1.0 + product / spread, spread])
 }
 
-/// Slope of the gains over the swings by weighted least squares, in its standard errors; 0 where all swings are alike.
+/// Slope of the gains over the input's range by weighted least squares, in standard errors; 0 if all ranges are equal.
 fn trend(gains: &[[f64; 3]]) -> f64 {
     let weight: f64 = gains.iter().map(|[_, _, w]| w).sum();
     let middle = gains.iter().map(|[swing, _, w]| w * swing).sum::<f64>() / weight;
     let (mut along, mut size) = (0.0, 0.0);
     for [swing, gain, w] in gains {
-        // The mean gain drops out: deviations from the middle add up to nothing.
+        // The mean gain drops out, since the deviations from the middle sum to 0.
         along += w * (swing - middle) * (gain - 1.0);
         size += w * (swing - middle).powi(2);
     }
@@ -282,8 +287,8 @@ fn trend(gains: &[[f64; 3]]) -> f64 {
     if size > 1e-12 * weight * largest * largest { along / size.sqrt() } else { 0.0 }
 }
 
-/// Mean of the residual's part in quadrature with the input's swing, ∮ r du scaled to unit steps of the input and per row; and what noise of the residual's
-/// strength exceeds in one case of a thousand. A row counts with half of the steps before and after it.
+/// Loop area ∮ r du per row of residuals over the input, for input steps of unit rms, and its limit. A row is weighted with half of the input's steps
+/// before and after it.
 fn loop_area(trace: &Trace) -> (f64, f64) {
     let steps: Vec<f64> = trace.inputs.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let rows = steps.len().max(1) as f64;
@@ -291,8 +296,8 @@ fn loop_area(trace: &Trace) -> (f64, f64) {
     if size == 0.0 {
         return (0.0, 0.0);
     }
-    let beside = |i: usize| 0.5 * (i.checked_sub(1).map_or(0.0, |k| steps[k]) + steps.get(i).copied().unwrap_or(0.0)) / size;
-    let weights: Vec<f64> = (0..trace.values.len()).map(beside).collect();
+    let weight = |i: usize| 0.5 * (i.checked_sub(1).map_or(0.0, |k| steps[k]) + steps.get(i).copied().unwrap_or(0.0)) / size;
+    let weights: Vec<f64> = (0..trace.values.len()).map(weight).collect();
     let spread = |values: &[f64]| {
         let mean = mean(values);
         values.iter().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt()
@@ -301,12 +306,11 @@ fn loop_area(trace: &Trace) -> (f64, f64) {
     (correlation(&trace.values, &weights) * both, correlation_limit(trace.values.len()) * both)
 }
 
-/// What unexplained residuals look like, in words.
+/// Describes unexplained residuals (σ) in words: where they are, and their shape in the worst runs.
 pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<String> {
     let mut words = Vec::new();
     let all = split.all();
     let signals = plant.signals();
-    // Residuals of values that are left out are 0.
     let count = |run: usize| used[run].iter().filter(|used| **used).count() as f64;
     let excess = |run: usize| (residuals[run].iter().map(|r| r * r).sum::<f64>() - count(run)).max(0.0);
     let whole: f64 = all.iter().map(|run| excess(*run)).sum();
@@ -325,7 +329,7 @@ pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals:
         let n = trace.values.len();
         let m = mean(&trace.values);
         let rms = (trace.values.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt();
-        // A frequency: the largest of a periodogram up to a quarter of the sampling rate.
+        // The peak of the periodogram up to a quarter of the sampling rate.
         let span = trace.times[n - 1] - trace.times[0];
         let top = (0.25 * n as f64) as usize;
         let best = (1..top.max(2))
@@ -334,7 +338,7 @@ pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals:
         let mut parts = Vec::new();
         if m.abs() > 0.7 * rms {
             parts.push(format!(
-                "one-sided: {} by {:.1} times the noise on average",
+                "one-sided: {} by {:.1} σ on average",
                 if m > 0.0 { "measured above simulated" } else { "measured below simulated" },
                 m.abs()
             ));
@@ -357,12 +361,12 @@ pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals:
         let half = n / 2;
         let change = mean(&trace.values[half..]) - mean(&trace.values[..half]);
         if change.abs() > rms {
-            parts.push(format!("changes by {change:.1} times the noise within the run"));
+            parts.push(format!("changes by {change:.1} σ within the run"));
         }
         if let Some((at, size)) = largest_step(&trace)
             && size.abs() > 1.2 * rms
         {
-            parts.push(format!("steps by {size:.1} times the noise at {at:.3} s"));
+            parts.push(format!("steps by {size:.1} σ at {at:.3} s"));
         }
         if parts.is_empty() {
             parts.push("broad-band".into());
@@ -372,7 +376,7 @@ pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals:
     words
 }
 
-/// Where the mean before and after differ most, and by how much.
+/// Time (s) and size (σ) of the largest step of the mean.
 fn largest_step(trace: &Trace) -> Option<(f64, f64)> {
     let n = trace.values.len();
     let sums: Vec<f64> = trace

@@ -1,49 +1,50 @@
-//! Which causes the data ask for: screening, forward and backward selection, and what could stand in for what.
+//! Selection of causes: screening, forward selection, backward elimination and replacement.
 //!
-//! Models are fitted to one part of the runs and judged on the other. The constants of the nominal model are free from the beginning, so that a
-//! cause is credited only with what re-tuned constants cannot do; in the end everything that the data do not need is taken out again.
+//! Models are fitted to the fit runs and judged on the held-out ones. The constants of the nominal model are free from the beginning, so that a
+//! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::DiagnoseError;
 use super::dataset::Role;
-use super::fit::{BLOCK, Bench, Care, Fit, Residuals, places, square};
+use super::fit::{BLOCK, Convergence, Estimator, Fit, Residuals, coordinates, sum_of_squares};
 use super::plant::{Free, Model, Plant, Signal, Term};
 
-/// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of a sixth of the noise (rms): other
-/// discretisations of one and the same physics differ by nearly that much; ...
+/// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
+/// discretisations of the same physics differ by; ...
 const LEAST_GAIN: f64 = 0.03;
-/// ... and by this share of what re-tuned constants leave unexplained: a cause that is not quite of the form of its model leaves traces that
-/// others could polish away; ...
+/// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
+/// right; ...
 const LEAST_SHARE: f64 = 0.004;
-/// ... and by so many standard errors of what noise alone does to the difference, ...
+/// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
-/// ... and if Bayes's information criterion falls by so much.
+/// ... and if BIC falls by at least this.
 const LEAST_BIC: f64 = 10.0;
-/// A cause that no held-out run shows is looked at again if it lowers the fit runs' χ² by this share of the number of values.
+/// A cause that no held-out run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
 const SEEN_BY_FIT: f64 = 0.1;
-/// Two models are tied if their χ² differ by less than this, or by less than two standard errors.
+/// Two models are tied if their χ² differ by less than this or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
 /// Candidates that are fitted after screening.
 const FINALISTS: usize = 7;
-/// Two causes are no pair if the squared sine of the angle between what they do is below this.
+/// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
 const LEAST_ANGLE: f64 = 1e-3;
-/// Most turns between the runs' nuisances and the model.
+/// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
-/// Most causes beside constants.
+/// Most causes in addition to the constants.
 const MOST_CAUSES: usize = 4;
 
-/// Runs by what they are for.
+/// Fit and held-out runs, by index.
 #[derive(Debug, Clone)]
 pub struct Split {
-    /// Parameters are fitted to these.
+    /// Runs to which parameters are fitted.
     pub fit: Vec<usize>,
-    /// Models are judged on these.
+    /// Runs on which models are judged.
     pub held: Vec<usize>,
 }
 
 impl Split {
-    /// All runs.
+    /// All runs in order.
     pub fn all(&self) -> Vec<usize> {
         let mut all = [self.fit.as_slice(), &self.held].concat();
         all.sort_unstable();
@@ -56,7 +57,7 @@ impl Split {
 pub struct Scored {
     /// The fit to the fit runs.
     pub fit: Fit,
-    /// Residuals of all runs, in standard deviations.
+    /// Residuals of all runs, in σ.
     pub residuals: Vec<Residuals>,
     /// χ² of the held-out runs.
     pub held: f64,
@@ -70,7 +71,7 @@ impl Scored {
         self.held + self.fitted
     }
 
-    /// χ² per value above 1, of `count` values in all runs.
+    /// χ² per value above 1, for `count` values in all runs.
     pub(super) fn above(&self, count: usize) -> f64 {
         (self.total() / count as f64 - 1.0).max(0.0)
     }
@@ -80,12 +81,12 @@ impl Scored {
         &self.fit.model
     }
 
-    /// Number of coordinates.
+    /// Number of fitted coordinates.
     pub fn freedom(&self) -> usize {
-        places(&self.fit.model).len()
+        coordinates(&self.fit.model).len()
     }
 
-    /// χ² + k ln N of the fit runs.
+    /// Bayesian information criterion of the fit runs: χ² + k ln N.
     pub fn bic(&self) -> f64 {
         self.fitted + self.freedom() as f64 * (self.fit.count as f64).ln()
     }
@@ -93,79 +94,89 @@ impl Scored {
 
 /// The search's state.
 pub struct Search<'a> {
-    /// Plant and nuisances.
-    pub bench: Bench<'a>,
+    /// The plant with its nuisance parameters.
+    pub estimator: Estimator<'a>,
     /// The runs.
     pub split: Split,
-    /// χ² per value, less 1, that re-tuned constants leave on the held-out runs; known after [`calibrated`](Self::calibrated).
+    /// χ² per value above 1 of re-tuned constants on the held-out runs, set by [`calibrated`](Self::calibrated).
     pub unexplained: f64,
-    /// Told what is being tried.
+    /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
 
-/// What fitting a candidate on top of the constants gave.
+/// A candidate fitted on top of the constants.
 #[derive(Debug, Clone)]
 pub struct Trial {
-    /// The candidate.
+    /// Index of the candidate.
     pub candidate: usize,
-    /// The model with it.
+    /// The model with the candidate.
     pub scored: Scored,
 }
 
-/// What causes would do if the model were linear.
+/// Linearised effect of the candidates.
 pub struct Screened {
-    /// By how much every start of every candidate would lower χ², and the model to fit from, best first.
+    /// Every start of every candidate: its linear estimate of the fall of χ², and the model to fit from; best first.
     pub ranked: Vec<(f64, Model)>,
-    /// Every start with what it adds to the residuals beside the model's own coordinates.
+    /// Every start with its change of the residuals, orthogonal to the model's tangents.
     columns: Vec<(Term, DVector<f64>)>,
-    /// The residuals beside the model's own coordinates.
+    /// The residuals, orthogonal to the model's tangents.
     rest: DVector<f64>,
 }
 
 impl Search<'_> {
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
-        self.bench.plant.candidates()[candidate].id
+        self.estimator.plant.candidates()[candidate].id
     }
 
-    /// Scores a model as it is.
-    pub fn score(&self, fit: Fit) -> Result<Scored, String> {
-        let all: Vec<usize> = (0..self.bench.plant.signals().len()).collect();
-        let residuals = self.bench.residuals_of(&fit.model, &all)?;
-        let sum = |runs: &[usize]| runs.iter().map(|run| square(&residuals[*run])).sum();
+    /// Scores a fitted model on all runs.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated, as for all fits.
+    pub fn score(&self, fit: Fit) -> Result<Scored, DiagnoseError> {
+        let all: Vec<usize> = (0..self.estimator.plant.signals().len()).collect();
+        let residuals = self.estimator.residuals_of(&fit.model, &all)?;
+        let sum = |runs: &[usize]| runs.iter().map(|run| sum_of_squares(&residuals[*run])).sum();
         Ok(Scored { held: sum(&self.split.held), fitted: sum(&self.split.fit), fit, residuals })
     }
 
     /// Fits a model and scores it.
-    pub fn fitted(&self, model: &Model) -> Result<Scored, String> {
-        self.score(self.bench.fit(model, &self.split.fit, Care::Full)?)
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn fitted(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+        self.score(self.estimator.fit(model, &self.split.fit, Convergence::Full)?)
     }
 
-    /// Fits a model well enough to rank it.
-    fn ranked(&self, model: &Model) -> Result<Scored, String> {
-        self.score(self.bench.fit(model, &self.split.fit, Care::Rank)?)
+    /// Fits a model to the convergence of [`Convergence::Rank`] and scores it.
+    fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+        self.score(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?)
     }
 
-    /// Fits the runs' nuisances to a model and the model to them, by turns until nothing changes.
-    pub fn settle(&mut self, scored: Scored) -> Result<Scored, String> {
+    /// Alternates fits of nuisance parameters and model until χ² has converged.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model cannot be simulated.
+    pub fn settle(&mut self, scored: Scored) -> Result<Scored, DiagnoseError> {
         let mut scored = scored;
         let all = self.split.all();
         for _ in 0..MOST_TURNS {
             let before = scored.total();
-            self.bench.fit_nuisances(scored.model(), &all)?;
+            self.estimator.fit_nuisances(scored.model(), &all)?;
             scored = self.fitted(scored.model())?;
-            if before - scored.total() < 1e-3 * (before - self.bench.count(&all) as f64).max(self.bench.count(&all) as f64) {
+            if before - scored.total()
+                < 1e-3 * (before - self.estimator.count(&all) as f64).max(self.estimator.count(&all) as f64)
+            {
                 break;
             }
         }
         Ok(scored)
     }
 
-    /// How far the χ² of `worse` lies above that of `better` on `runs`, in standard errors and in itself.
+    /// Δχ² of `worse` over `better` on `runs`: in standard errors, and as it is.
     ///
-    /// With a the residuals of the better model and d the difference of the predictions, both in units of the noise, Δχ² = Σ (2 a d + d²). Noise of
-    /// unit variance makes it scatter by 2 |d|, and structure that is left in a by 2 √Σ (Σ a d)² with inner sums over blocks of values that
-    /// may hang together; the larger of the two counts.
+    /// With a the residuals of the better model and d the difference of the predictions, both in σ, Δχ² = Σ (2 a d + d²). Its standard error is
+    /// 2 |d| for independent noise, and 2 √Σ (Σ a d)² with inner sums over blocks within which a may be correlated; the larger counts.
     pub fn gap(&self, better: &Scored, worse: &Scored, runs: &[usize]) -> (f64, f64) {
         let (mut sum, mut apart, mut structure) = (0.0, 0.0, 0.0);
         for run in runs {
@@ -182,54 +193,61 @@ impl Search<'_> {
         (sum / (2.0 * f64::max(apart, structure).sqrt()).max(1e-9), sum)
     }
 
-    /// Whether `more` is worth its additional parameters beside `less`.
+    /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
         let (sigmas, gain) = self.gap(more, less, runs);
-        let count = self.bench.count(runs) as f64;
+        let count = self.estimator.count(runs) as f64;
         gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
             && sigmas > LEAST_SIGMAS
             && more.bic() < less.bic() - LEAST_BIC
     }
 
-    /// Whether two models cannot be told apart by any run.
+    /// True if the runs cannot tell two models apart.
     pub fn is_tied(&self, better: &Scored, other: &Scored) -> bool {
         let (sigmas, gap) = self.gap(better, other, &self.split.all());
         gap < TIED_CHI2 || sigmas < 2.0
     }
 
+    /// All constants at their nominal values, as terms.
     fn constants(&self) -> Vec<Term> {
-        // Areal mass enters all motion only by its ratio to the stiffness: one of the two is enough.
-        let candidates = self.bench.plant.candidates().iter().enumerate();
+        // Motion depends on areal mass only through its ratio to the stiffness.
+        let candidates = self.estimator.plant.candidates().iter().enumerate();
         let constants = candidates.filter(|(_, c)| c.is_constant && c.id != "areal-mass");
         constants
             .map(|(candidate, c)| Term { candidate, x: c.parameters.iter().map(|p| p.off.unwrap_or(p.bounds[0])).collect() })
             .collect()
     }
 
-    /// A model with all constants free; those that it has not are added at the end.
+    /// The model with all constants free; missing ones are appended.
     pub fn with_constants(&self, model: &Model) -> Model {
         let mut all = model.clone();
         all.terms.extend(self.constants().into_iter().filter(|c| model.terms.iter().all(|term| term.candidate != c.candidate)));
         all
     }
 
-    /// The nominal model with its constants free.
-    pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, String> {
+    /// The nominal model with its constants fitted.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model cannot be simulated.
+    pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, DiagnoseError> {
         let scored = self.fitted(&Model { terms: self.constants(), resolution, fine: false })?;
         let scored = self.settle(scored)?;
         let (chi2, runs) =
             if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) };
-        self.unexplained = (chi2 / self.bench.count(runs).max(1) as f64 - 1.0).max(0.0);
+        self.unexplained = (chi2 / self.estimator.count(runs).max(1) as f64 - 1.0).max(0.0);
         Ok(scored)
     }
 
-    /// How much every start of every candidate would lower χ² on all runs if the model were linear, beside what the model's own coordinates could do.
-    pub fn screen(&self, from: &Scored) -> Result<Screened, String> {
+    /// Linear estimates of how far every start of every candidate would lower χ² on all runs, beyond a refit of the model's own coordinates.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn screen(&self, from: &Scored) -> Result<Screened, DiagnoseError> {
         let runs = self.split.all();
         let base = from.model();
         let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
-        let candidates = self.bench.plant.candidates();
+        let candidates = self.estimator.plant.candidates();
         let mut starts = Vec::new();
         for (candidate, c) in candidates.iter().enumerate().filter(|(_, c)| !used.contains(&c.id)) {
             starts.extend(c.starts.iter().map(|x| Term { candidate, x: x.clone() }));
@@ -240,7 +258,7 @@ impl Search<'_> {
             .par_iter()
             .map(|term| {
                 let model = with(base, [term.clone()]);
-                let residuals = self.bench.residuals_of(&model, &runs).ok()?;
+                let residuals = self.estimator.residuals_of(&model, &runs).ok()?;
                 let column = without(&own, &(DVector::from_vec(residuals.concat()) - &plain));
                 (column.norm_squared() > 1e-12).then_some(column)
             })
@@ -259,8 +277,8 @@ impl Search<'_> {
         Ok(Screened { ranked, columns, rest })
     }
 
-    /// The two screened causes that would lower χ² most together, if they do by more than twice what the best does alone: others will be found one
-    /// after the other.
+    /// The two screened causes that would lower χ² most together, if by more than twice what the best does alone: other pairs are found one cause
+    /// at a time.
     fn pair(&self, base: &Model, screened: &Screened) -> Option<Model> {
         let Screened { ranked, columns, rest } = screened;
         let mut least = 2.0 * ranked.first().map_or(0.0, |(gain, _)| *gain);
@@ -286,10 +304,10 @@ impl Search<'_> {
         pair
     }
 
-    /// A start that is moved along the way from where its cause does nothing, and whether it can go that way: a cause that is asked for with the wrong
-    /// sign stays where it was tried.
+    /// A start moved along the line from its off value, and true if the bounds allow the direction: a cause of one sign that the data need with the
+    /// other one is not moved.
     fn moved(&self, start: &Term, along: f64) -> (Term, bool) {
-        let parameters = &self.bench.plant.candidates()[start.candidate].parameters;
+        let parameters = &self.estimator.plant.candidates()[start.candidate].parameters;
         if parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1])) && along < 0.05 {
             return (start.clone(), false);
         }
@@ -300,16 +318,16 @@ impl Search<'_> {
         (Term { candidate: start.candidate, x: start.x.iter().zip(parameters).map(moved).collect() }, true)
     }
 
-    /// Derivatives of the residuals by the model's coordinates, made orthogonal.
-    fn tangents(&self, model: &Model, runs: &[usize], plain: &DVector<f64>) -> Result<Vec<DVector<f64>>, String> {
-        let columns: Vec<DVector<f64>> = places(model)
+    /// Orthonormal basis of the residuals' derivatives by the model's coordinates.
+    fn tangents(&self, model: &Model, runs: &[usize], plain: &DVector<f64>) -> Result<Vec<DVector<f64>>, DiagnoseError> {
+        let columns: Vec<DVector<f64>> = coordinates(model)
             .par_iter()
-            .map(|place| {
+            .map(|coordinate| {
                 let mut shifted = model.clone();
-                shifted.terms[place.0].x[place.1] += self.bench.step(model, *place);
-                Ok(DVector::from_vec(self.bench.residuals_of(&shifted, runs)?.concat()) - plain)
+                shifted.terms[coordinate.0].x[coordinate.1] += self.estimator.step(model, *coordinate);
+                Ok(DVector::from_vec(self.estimator.residuals_of(&shifted, runs)?.concat()) - plain)
             })
-            .collect::<Result<_, String>>()?;
+            .collect::<Result<_, DiagnoseError>>()?;
         let mut orthogonal: Vec<DVector<f64>> = Vec::new();
         for column in columns {
             let size = column.norm();
@@ -322,7 +340,7 @@ impl Search<'_> {
         Ok(orthogonal)
     }
 
-    /// The best screened starts of different candidates, `count` of them.
+    /// The best screened starts of `count` different candidates.
     fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
         let mut chosen: Vec<Model> = Vec::new();
         for (_, model) in screened {
@@ -334,8 +352,11 @@ impl Search<'_> {
         chosen
     }
 
-    /// The best screened candidates fitted on top of `from`, best on held-out runs first; and what was screened.
-    pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), String> {
+    /// The best screened candidates fitted on top of `from`, best on held-out runs first, and the screening.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
+    pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
         let screened = self.screen(from)?;
         let finalists = self.finalists(&screened.ranked, FINALISTS);
@@ -343,12 +364,12 @@ impl Search<'_> {
         for model in finalists {
             let Some(term) = model.terms.last() else { continue };
             (self.progress)(&format!("fitting {}", self.id(term.candidate)));
-            // What cannot be fitted is no explanation.
+            // A candidate that cannot be fitted is dropped.
             if let Ok(scored) = self.ranked(&model) {
                 trials.push(Trial { candidate: term.candidate, scored });
             }
         }
-        // Those that may win are fitted to the end: a fit that is cut short may look better on held-out runs than one that goes further.
+        // Possible winners are refitted: an unconverged fit may do better on held-out runs than a converged one.
         let best = |by: &dyn Fn(&Scored) -> f64| {
             (0..trials.len()).min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
         };
@@ -362,13 +383,16 @@ impl Search<'_> {
         Ok((trials, screened))
     }
 
-    /// What models are ranked by: χ² of the held-out runs, or of all where there are none.
+    /// The criterion of ranking: χ² of the held-out runs, or BIC where there are none.
     pub fn judged(&self, scored: &Scored) -> f64 {
         if self.split.held.is_empty() { scored.bic() } else { scored.held }
     }
 
-    /// Adds causes while they are worth it. Returns the last model and the first round's trials.
-    pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), String> {
+    /// Forward selection: adds causes while they are worth it. Returns the last model and the first round's trials.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model cannot be simulated.
+    pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
@@ -393,7 +417,7 @@ impl Search<'_> {
         Ok((best, first.unwrap_or_default()))
     }
 
-    /// Two causes that hide one another: neither is worth it alone. What cannot be fitted is no explanation.
+    /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.
     fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
         let pair = self.pair(base.model(), screened)?;
         if let [.., first, second] = &pair.terms[..] {
@@ -403,16 +427,16 @@ impl Search<'_> {
         self.fitted(both.model()).ok()
     }
 
-    /// Whether the fit runs miss what `less` leaves out.
+    /// True if the fit runs need what `less` leaves out.
     fn is_seen_by_fit(&self, more: &Scored, less: &Scored) -> bool {
-        less.fitted - more.fitted > SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.bench.count(&self.split.fit) as f64
+        less.fitted - more.fitted > SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
     }
 
-    /// A cause may show in runs that are fitted and in none that is held out. If one does much for the fit, the run it does most for is held out as
-    /// well: the cause, fitted to the others, has to do for it too. Keeps the new split if it does.
-    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Result<Option<Scored>, String> {
+    /// A cause that shows in fit runs only: the run that it improves most is held out as well, and the cause, fitted to the others, has to improve it
+    /// too. Keeps the new split if it does.
+    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Result<Option<Scored>, DiagnoseError> {
         let Some(trial) = trials.iter().min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted)) else { return Ok(None) };
-        let gain = |run: &usize| square(&base.residuals[*run]) - square(&trial.scored.residuals[*run]);
+        let gain = |run: &usize| sum_of_squares(&base.residuals[*run]) - sum_of_squares(&trial.scored.residuals[*run]);
         let most = self.split.fit.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b)));
         let Some(run) = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base)) else {
             return Ok(None);
@@ -432,8 +456,11 @@ impl Search<'_> {
         Ok(None)
     }
 
-    /// Takes out what is not worth it, the least needed first.
-    pub fn backward(&self, from: Scored) -> Result<Scored, String> {
+    /// Backward elimination: removes terms that are not worth it, the least needed first.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model cannot be simulated.
+    pub fn backward(&self, from: Scored) -> Result<Scored, DiagnoseError> {
         let mut best = from;
         loop {
             let shorter = |index: usize| {
@@ -442,8 +469,8 @@ impl Search<'_> {
                 (self.progress)(&format!("doing without {}", self.id(term.candidate)));
                 self.ranked(&model)
             };
-            // What the discretisation could do as well goes first.
-            let plant = self.bench.plant;
+            // First those within the error of the discretisation.
+            let plant = self.estimator.plant;
             let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
             if let Some(idle) = idle {
                 best = self.fitted(shorter(idle)?.model())?;
@@ -459,8 +486,11 @@ impl Search<'_> {
         }
     }
 
-    /// Puts every other candidate in the place of every cause: what does better, or as well.
-    pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, String> {
+    /// Replaces every cause by other candidates, `most` of each: the index of the term, and the trial.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model without one of its causes cannot be simulated.
+    pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         for index in 0..best.model().terms.len() {
             let mut model = best.model().clone();
@@ -480,16 +510,19 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// The number of joints that fits best, near the one at hand: χ² over all runs decides, for it has no other parameter.
-    pub fn resolve(&mut self, best: Scored) -> Result<Scored, String> {
-        let ladder = self.bench.plant.resolutions();
+    /// The discretisation with the least χ² over all runs, by steps from the present one.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model cannot be simulated.
+    pub fn resolve(&mut self, best: Scored) -> Result<Scored, DiagnoseError> {
+        let resolutions = self.estimator.plant.resolutions();
         let mut best = best;
         let mut tried = vec![best.model().resolution];
         loop {
-            let Some(at) = ladder.iter().position(|r| *r == best.model().resolution) else { return Ok(best) };
-            let beside = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter_map(|k| ladder.get(k).copied());
+            let Some(at) = resolutions.iter().position(|r| *r == best.model().resolution) else { return Ok(best) };
+            let neighbours = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter_map(|k| resolutions.get(k).copied());
             let mut moved = false;
-            for resolution in beside.filter(|r| !tried.contains(r)).collect::<Vec<_>>() {
+            for resolution in neighbours.filter(|r| !tried.contains(r)).collect::<Vec<_>>() {
                 tried.push(resolution);
                 (self.progress)(&format!("{resolution} joints per actuator"));
                 let other = self.fitted(&Model { resolution, ..best.model().clone() })?;
@@ -513,7 +546,7 @@ fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
     model
 }
 
-/// What of a vector is orthogonal to unit vectors.
+/// The part of a vector that is orthogonal to orthonormal ones.
 fn without(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
     let mut rest = vector.clone();
     for direction in unit {
@@ -523,7 +556,7 @@ fn without(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
     rest
 }
 
-/// Covariance of a fit's coordinates; infinite variances where the data say nothing.
+/// Covariance of a fit's coordinates (coordinates × coordinates); infinite variances for those that the data do not determine.
 pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     let n = information.nrows();
     if n == 0 {
@@ -552,9 +585,11 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Splits runs: those whose role is given as given. Of the others, runs whose input jumps and runs whose input is smooth are split alike: put in
-/// the order of how fast their inputs are, one of every three neighbours is held out, by turns the one with the largest and the one with the
-/// smallest input; the slowest and the fastest never are. Of two or three runs in all, the middle or last one is.
+/// Splits runs into fit and held-out ones; given roles are kept.
+///
+/// The others are split in the same way among runs with jumps of the input and among those without: in order of the input's speed, one of every
+/// three neighbours is held out, in turn the one with the largest and the one with the smallest range; the slowest and the fastest never are. Of two
+/// or three runs in all, the last or middle one is held out.
 pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
     let signals = plant.signals();
     let (mut fit, mut held) = (Vec::new(), Vec::new());
@@ -593,13 +628,14 @@ pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
     Split { fit, held }
 }
 
-/// How a run's input goes.
+/// Speed and range of a run's input.
 struct Pace {
     run: usize,
-    /// Swings per second.
+    /// Path of the input over its range, per second.
     speed: f64,
+    /// Largest less smallest input.
     range: f64,
-    /// Whether it changes by a good part of its range from one row to the next.
+    /// True if the input jumps between two rows.
     jumps: bool,
 }
 
@@ -608,16 +644,16 @@ impl Pace {
         let (low, high) =
             signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
         let range = (high - low).max(1e-9);
-        let (mut way, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
+        let (mut path, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
         for (u, t) in signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]) {
-            way += (u[1] - u[0]).abs();
+            path += (u[1] - u[0]).abs();
             largest = largest.max((u[1] - u[0]).abs());
             time += t[1] - t[0];
         }
         let rows = signal.inputs.len().max(1) as f64;
         // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
-        let jumps = largest > 6.0 * way / rows && largest > 0.05 * range;
-        Self { run, speed: way / range / f64::max(time, 1e-9), range, jumps }
+        let jumps = largest > 6.0 * path / rows && largest > 0.05 * range;
+        Self { run, speed: path / range / f64::max(time, 1e-9), range, jumps }
     }
 }
 
@@ -626,7 +662,7 @@ mod tests {
     use super::*;
     use crate::diagnose::plant::Candidate;
 
-    /// Two slow waves that differ little, as far as candidates go; runs of their sum with noise.
+    /// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
     struct Waves {
         signals: Vec<Signal>,
         candidates: Vec<Candidate>,
@@ -698,7 +734,7 @@ mod tests {
             &self.candidates
         }
 
-        fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, String> {
+        fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
             let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
             Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
         }
@@ -706,16 +742,16 @@ mod tests {
 
     fn found(plant: &Waves) -> Vec<&'static str> {
         let progress = |_: &str| {};
-        let bench = Bench::new(plant);
-        let mut search = Search { bench, split: split(plant, &[Role::Auto; 6]), unexplained: 0.0, progress: &progress };
+        let estimator = Estimator::new(plant);
+        let mut search = Search { estimator, split: split(plant, &[Role::Auto; 6]), unexplained: 0.0, progress: &progress };
         let plain = search.calibrated(1.0).unwrap();
         let (best, _) = search.forward(plain).unwrap();
         best.model().terms.iter().map(|term| search.id(term.candidate)).collect()
     }
 
     #[test]
-    fn two_causes_that_hide_one_another_are_found_together() {
-        // Together they make a wave of amplitude 0.12 × 12; one of them alone can take up 0.4 % of its square.
+    fn two_causes_that_mask_one_another_are_found_together() {
+        // Together they make a wave of amplitude 0.12 × 12; one of them alone can take up 0.4 % of its sum_of_squares.
         let mut both = found(&Waves::new(&[("first", 12.0), ("second", 12.0)]));
         both.sort_unstable();
         assert_eq!(both, ["first", "second"]);

@@ -1,27 +1,27 @@
-//! From sampled commands to voltages in time: smooth between rows, straight where the rows are, and with jumps at once.
+//! Interpolation of sampled commands: cubic splines where rows are smooth, straight lines elsewhere, and jumps.
 //!
-//! A row holds the voltage commanded at its time. What happened between two rows has to be read out of the rows themselves. A sine that is
-//! joined by straight lines loses (π f Δt)²/3 of its amplitude, which at 25 Hz and 2 ms is eight times the noise of a camera; so smooth stretches
-//! get a cubic spline. A jump between two rows took place at an unknown moment between them: [`Command::jumps`] lists these, and the moments are
-//! fitted with each run.
+//! A sine joined by straight lines loses (π f Δt)²/3 of its amplitude, eight times a camera's noise at 25 Hz and 2 ms. A jump happened at an unknown
+//! time between two rows: [`Command::jumps`] lists these, and their times are nuisance parameters of the run.
 
+use super::quality::median_interval;
 use crate::drive::Table;
+use crate::experiment::hermite_at;
 
-/// A change between two rows is a jump if it is this many times as large as the changes beside it, and at least so many volts.
+/// A change between two rows is a jump if it exceeds the neighbouring changes by this factor and by this voltage (V).
 const JUMP_RATIO: f64 = 5.0;
 const JUMP_LEAST: f64 = 5.0;
-/// A bend at a row is a kink if it is this many times as large as the bends two rows away.
+/// A bend at a row is a kink if it exceeds the bends two rows away by this factor.
 const KINK_RATIO: f64 = 8.0;
-/// Bends of rounded values (V) below which rows are on a straight line: commands are written to 0.01 V or so.
+/// Least bend of a curved row (V): commands are rounded to about 0.01 V.
 const STRAIGHT: f64 = 0.05;
-/// Points that a spline is given between two rows.
+/// Points of a spline between two rows.
 const BETWEEN: usize = 8;
 
 /// A run's sampled command.
 #[derive(Debug, Clone)]
 pub struct Command {
     times: Vec<f64>,
-    /// Row after row.
+    /// Rows × actuators (V).
     volts: Vec<f64>,
     actuators: usize,
     /// Rows after which some voltage jumps.
@@ -29,7 +29,7 @@ pub struct Command {
 }
 
 impl Command {
-    /// Looks for the jumps of a command: rising times (s) and voltages (V), row after row, one per actuator.
+    /// A command of rising `times` (s) and `volts` (V), rows × actuators.
     pub fn new(times: &[f64], volts: &[f64], actuators: usize) -> Self {
         let rows = times.len();
         let change =
@@ -56,13 +56,13 @@ impl Command {
         [self.times[row], self.times[row + 1]]
     }
 
-    /// The command in time, with every jump after the given share of its interval (0 to 1).
+    /// The interpolated command, with each jump after the given share (0 to 1) of its interval.
     pub fn table(&self, shares: &[f64]) -> Table {
         let (mut times, mut volts) = (Vec::new(), Vec::new());
         let mut first = 0;
         let ends = self.jumps.iter().copied().chain([self.times.len() - 1]);
         for (piece, last) in ends.enumerate() {
-            // A piece reaches from one jump to the next; its values hold to the jumps.
+            // Each piece between two jumps is extended to them by its end values.
             if piece > 0 {
                 let [from, to] = self.jump_interval(piece - 1);
                 let at = (from + shares[piece - 1].clamp(0.0, 1.0) * (to - from)).max(from + 2e-9);
@@ -78,12 +78,12 @@ impl Command {
             first = last + 1;
         }
         Table::new(times, volts, self.actuators).unwrap_or_else(|_| {
-            // Rows closer together than the jumps' width: the plain rows rise, for that was checked when they were read.
+            // Rows closer than a jump's width: the rows without it rise.
             Table::new(self.times.clone(), self.volts.clone(), self.actuators).unwrap_or_else(|_| unreachable!("rows rise"))
         })
     }
 
-    /// Adds the rows `first..=last` with points of a spline between them where they are curved.
+    /// Appends the rows `first..=last`, with points of a spline between curved ones.
     fn smooth(&self, first: usize, last: usize, times: &mut Vec<f64>, volts: &mut Vec<f64>) {
         let curved: Vec<Vec<Option<f64>>> = (0..self.actuators).map(|a| self.slopes(first, last, a)).collect();
         for row in first..=last {
@@ -103,10 +103,7 @@ impl Command {
                 for (a, slopes) in curved.iter().enumerate() {
                     let [v0, v1] = [row, row + 1].map(|row| self.volts[row * self.actuators + a]);
                     let value = match (slopes[2 * at], slopes[2 * at + 1]) {
-                        (Some(m0), Some(m1)) => {
-                            let (h, r) = (t1 - t0, 1.0 - s);
-                            r * r * ((1.0 + 2.0 * s) * v0 + s * h * m0) + s * s * ((1.0 + 2.0 * r) * v1 - r * h * m1)
-                        }
+                        (Some(m0), Some(m1)) => hermite_at(s, t1 - t0, [v0, m0], [v1, m1]),
                         _ => v0 + s * (v1 - v0),
                     };
                     volts.push(value);
@@ -115,13 +112,12 @@ impl Command {
         }
     }
 
-    /// Slopes (V/s) at both ends of every interval between rows `first` and `last`, of a natural cubic spline between kinks; none where the
-    /// rows are straight.
+    /// Slopes (V/s) of the spline at both ends of every interval between rows `first` and `last`; none for straight rows. Splines end at kinks.
     fn slopes(&self, first: usize, last: usize, actuator: usize) -> Vec<Option<f64>> {
         let n = last - first;
         let t: Vec<f64> = self.times[first..=last].to_vec();
         let v: Vec<f64> = (first..=last).map(|row| self.volts[row * self.actuators + actuator]).collect();
-        // How far a row lies off the line through its neighbours.
+        // Distance of a row from the line through its neighbours (V).
         let bend = |i: usize| {
             if i == 0 || i >= n {
                 return 0.0;
@@ -131,8 +127,8 @@ impl Command {
         };
         let mut slopes = vec![None; 2 * n];
         let is_kink = |i: usize| {
-            let beside = bend(i.saturating_sub(2)).max(bend(i + 2));
-            bend(i) > STRAIGHT && bend(i) > KINK_RATIO * beside
+            let neighbours = bend(i.saturating_sub(2)).max(bend(i + 2));
+            bend(i) > STRAIGHT && bend(i) > KINK_RATIO * neighbours
         };
         let mut from = 0;
         for i in 1..=n {
@@ -151,8 +147,8 @@ impl Command {
     }
 }
 
-/// Slopes of the natural cubic spline, by Thomas's algorithm. The end conditions are those of parabolas through the first and last three rows,
-/// so that a sine that begins at its turning point keeps its curvature there.
+/// Slopes (V/s) of the cubic spline through the rows, by Thomas's algorithm. At its ends it follows the parabolas through the first and last three
+/// rows, which keeps the curvature of a sine that begins at its turning point.
 fn spline(t: &[f64], v: &[f64]) -> Vec<f64> {
     let n = t.len();
     let (h, d): (Vec<f64>, Vec<f64>) = (1..n).map(|i| (t[i] - t[i - 1], (v[i] - v[i - 1]) / (t[i] - t[i - 1]))).unzip();
@@ -179,24 +175,25 @@ fn spline(t: &[f64], v: &[f64]) -> Vec<f64> {
     slopes
 }
 
-/// A row cannot be told from its neighbours if the cubic through two on either side misses it by this share of their swing: a sine of fewer than five rows
-/// a period. Rows near jumps and rows that move by less than a share of the run's swing do not count.
+/// A row is unpredictable if the cubic through its four neighbours misses it by this share of their range, as with a sine of fewer than five rows per
+/// period.
 const MISSED: f64 = 0.15;
+/// Least range of five neighbouring rows, as a share of the run's, that counts as motion.
 const MOVING: f64 = 0.1;
-/// Rows that are looked at together, and how many of them may not be told from their neighbours: corners of triangles and edges cost one to three each.
-const TOGETHER: usize = 20;
+/// Most unpredictable rows among [`TOGETHER`] successive ones: a corner or edge costs one to three.
 const MOST_MISSED: usize = 8;
-/// A gap between rows is so many times the usual one; within it the voltage may not change by more than this share of the run's swing.
+const TOGETHER: usize = 20;
+/// A gap exceeds the median interval by this factor; ...
 const GAP: f64 = 3.0;
+/// ... within it the voltage may change by this share of the run's range.
 const WITHIN_GAP: f64 = 0.5;
 
-/// Why voltages are not known between the rows, if so: they change too much from row to row, or across a gap.
+/// Why the voltages `volts` (V, rows × actuators) are not known between rows at `times` (s), if so: they change too much from row to row, or across a
+/// gap.
 pub fn too_coarse(times: &[f64], volts: &[f64], actuators: usize) -> Option<String> {
     let command = Command::new(times, volts, actuators);
     let rows = times.len();
-    let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    gaps.sort_by(f64::total_cmp);
-    let usual = *gaps.get(gaps.len() / 2)?;
+    let usual = median_interval(times)?;
     let needed = "record the voltage at least ten times per period of the drive";
     for actuator in 0..actuators {
         let v: Vec<f64> = volts.iter().skip(actuator).step_by(actuators).copied().collect();

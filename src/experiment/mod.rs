@@ -22,8 +22,8 @@ pub use config::{
 pub use range::Bending;
 pub(crate) use range::{step_too_long, unstable};
 pub use resolve::{experiment, with_bodies};
-pub(crate) use run::hermite;
 pub use run::{Control, Run, run};
+pub(crate) use run::{hermite, hermite_at};
 pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};

@@ -360,7 +360,11 @@ fn see(recording: &mut Recording, view: &View, origin: f64) {
 /// The cubic through position and velocity at both `ends` (s), at the time `t`.
 pub(crate) fn hermite(t: f64, ends: [f64; 2], [p0, v0]: [f64; 2], [p1, v1]: [f64; 2]) -> f64 {
     let h = ends[1] - ends[0];
-    let s = (t - ends[0]) / h;
+    hermite_at((t - ends[0]) / h, h, [p0, v0], [p1, v1])
+}
+
+/// The cubic through value and slope (1/s) at both ends of an interval of `h` (s), at the share `s` of it.
+pub(crate) fn hermite_at(s: f64, h: f64, [p0, v0]: [f64; 2], [p1, v1]: [f64; 2]) -> f64 {
     let (a, b) = (1.0 - s, s);
     a * a * ((1.0 + 2.0 * s) * p0 + s * h * v0) + b * b * ((1.0 + 2.0 * a) * p1 - a * h * v1)
 }

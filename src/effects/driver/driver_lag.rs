@@ -4,7 +4,8 @@
 //! T·dV_a/dt + V_a = V_c,  T = R·C
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use super::follower::{Follower, Law};
+use crate::effects::{Action, Effect, Kind, Parameter};
 
 /// See the file's head.
 pub const DRIVER_LAG: Effect = Effect {
@@ -21,51 +22,40 @@ pub const DRIVER_LAG: Effect = Effect {
         default: None,
         about: "time constant T",
     }],
-    action: Action::Voltages(|p, n, _| Box::new(Lag { time: p[0], volts: vec![0.0; n] })),
+    action: Action::Voltages(|p, n, _| Box::new(Follower::new(Lag { time: p[0] }, n))),
 };
 
 /// The state is the voltage at the end of the last step; exact for voltages that are constant over a step.
 struct Lag {
+    /// T (s).
     time: f64,
-    volts: Vec<f64>,
 }
 
-impl SignalStage for Lag {
-    fn settle(&mut self, volts: &mut [f64]) {
-        self.volts.copy_from_slice(volts);
-    }
-
-    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+impl Law for Lag {
+    fn follow(&self, dt: f64, state: &mut [f64], volts: &mut [f64]) {
         let steps = dt / self.time;
         // 1 − exp(−dt/T), and its mean over the step.
         let gone = -(-steps).exp_m1();
         let mean = gone / steps;
-        for (now, volts) in self.volts.iter_mut().zip(volts) {
-            let away = *now - *volts;
-            *now = *volts + away * (1.0 - gone);
+        for (state, volts) in state.iter_mut().zip(volts) {
+            let away = *state - *volts;
+            *state = *volts + away * (1.0 - gone);
             *volts += away * mean;
         }
-    }
-
-    fn memory(&self) -> Vec<f64> {
-        self.volts.clone()
-    }
-
-    fn remember(&mut self, memory: &[f64]) {
-        self.volts.copy_from_slice(memory);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::SignalStage;
 
     #[test]
     fn a_step_response_is_the_exponential() {
-        let mut lag = Lag { time: 0.01, volts: vec![0.0] };
+        let mut lag = Follower::new(Lag { time: 0.01 }, 1);
         for _ in 0..25 {
             lag.pass(1e-3, &mut [100.0]);
         }
-        assert!((lag.volts[0] - 100.0 * (1.0 - (-2.5_f64).exp())).abs() < 1e-12);
+        assert!((lag.state()[0] - 100.0 * (1.0 - (-2.5_f64).exp())).abs() < 1e-12);
     }
 }

@@ -1,6 +1,7 @@
 //! Between the commanded and the applied voltage.
 
 mod driver_lag;
+mod follower;
 mod saturation;
 mod slew_limit;
 mod time_delay;

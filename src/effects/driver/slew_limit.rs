@@ -4,7 +4,8 @@
 //! |dV_a/dt| ≤ S, otherwise V_a = V_c
 //! ```
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use super::follower::{Follower, Law};
+use crate::effects::{Action, Effect, Kind, Parameter};
 
 /// See the file's head.
 pub const SLEW_LIMIT: Effect = Effect {
@@ -21,50 +22,37 @@ pub const SLEW_LIMIT: Effect = Effect {
         default: None,
         about: "largest rate S",
     }],
-    action: Action::Voltages(|p, n, _| Box::new(Slew { rate: p[0], volts: vec![0.0; n] })),
+    action: Action::Voltages(|p, n, _| Box::new(Follower::new(Slew { rate: p[0] }, n))),
 };
 
-/// Follows at a limited rate. The state is the voltage in the middle of the last step.
+/// The state is the voltage in the middle of the last step.
 struct Slew {
+    /// S (V/s).
     rate: f64,
-    volts: Vec<f64>,
 }
 
-impl SignalStage for Slew {
-    fn settle(&mut self, volts: &mut [f64]) {
-        self.volts.copy_from_slice(volts);
-    }
-
-    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
-        let most = self.rate * dt;
-        for (now, volts) in self.volts.iter_mut().zip(volts) {
-            // From the middle of the last step to the middle of this one: the mean of a straight line is its value there.
-            *now += (*volts - *now).clamp(-most, most);
-            *volts = *now;
-        }
-    }
-
+impl Law for Slew {
     /// A jump begins a ramp at its moment, not at the step's.
-    fn parts(&self) -> usize {
-        16
-    }
+    const PARTS: usize = 16;
 
-    fn memory(&self) -> Vec<f64> {
-        self.volts.clone()
-    }
-
-    fn remember(&mut self, memory: &[f64]) {
-        self.volts.copy_from_slice(memory);
+    fn follow(&self, dt: f64, state: &mut [f64], volts: &mut [f64]) {
+        let most = self.rate * dt;
+        for (state, volts) in state.iter_mut().zip(volts) {
+            // From the middle of the last step to the middle of this one: the mean of a straight line is its value there.
+            *state += (*volts - *state).clamp(-most, most);
+            *volts = *state;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::SignalStage;
 
     #[test]
     fn a_jump_becomes_a_ramp_of_the_limiting_rate() {
-        let mut slew = Slew { rate: 1e4, volts: vec![0.0] };
+        let mut slew = Follower::new(Slew { rate: 1e4 }, 1);
         let mut sum = 0.0;
         for _ in 0..200 {
             let mut volts = [-1000.0];

@@ -1,0 +1,222 @@
+//! The CSV file of a measured run.
+
+use std::path::Path;
+
+use super::dataset::{AXES, DataError, Marker};
+use super::quality::median_interval;
+use crate::model::Robot;
+use crate::words;
+
+/// Largest time (s), voltage (V) and position (mm): beyond these a column has another unit, since MFC actuators take 1.5 kV and no robot is a
+/// hundred metres long.
+const MOST_SECONDS: f64 = 1e7;
+const MOST_VOLTS: f64 = 1e4;
+const MOST_MM: f64 = 1e5;
+/// Least interval between rows (s): a voltage jump between two rows is given a width of 10⁻⁹ s.
+const LEAST_SECONDS: f64 = 1e-8;
+
+/// The rows of a run. Missing values are NaN.
+#[derive(Debug)]
+pub(super) struct Rows {
+    /// Times (s).
+    pub times: Vec<f64>,
+    /// Voltages (V), rows × actuators.
+    pub voltages: Vec<f64>,
+    /// Channels × rows (mm): x and z of every marker, in order; a channel without a column is empty.
+    pub channels: Vec<Vec<f64>>,
+    /// Remarks on the data, in words.
+    pub remarks: Vec<String>,
+}
+
+/// Reads the run of a robot with `markers`.
+///
+/// # Errors
+/// [`DataError`] with line and column.
+pub(super) fn read(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<Rows, DataError> {
+    let bytes =
+        crate::files::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
+    parse(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage)).map_err(|Wrong { line, column, reason }| {
+        match line {
+            0 => DataError::Unreadable { path: path.into(), reason },
+            _ => DataError::Content { path: path.into(), line, column, reason },
+        }
+    })
+}
+
+/// What is wrong in a run's file.
+#[derive(Debug)]
+struct Wrong {
+    /// Line, from 1; 0 for the whole file.
+    line: u64,
+    /// Column, from 1; 0 for a whole line.
+    column: usize,
+    reason: String,
+}
+
+/// Parses a run of a robot with a number of `actuators`; `check_voltage` refuses a voltage (V) with a reason.
+fn parse(
+    bytes: &[u8],
+    actuators: usize,
+    markers: &[Marker],
+    check_voltage: impl Fn(f64) -> Result<(), String>,
+) -> Result<Rows, Wrong> {
+    let wrong = |line: u64, column: usize, reason: String| Wrong { line, column, reason };
+    if bytes.is_empty() {
+        return Err(wrong(0, 0, "is empty".into()));
+    }
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+    let headers = reader.headers().map_err(|error| wrong(1, 0, error.to_string()))?.clone();
+    let names: Vec<String> = markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}_mm", marker.name))).collect();
+    let mut time_column = None;
+    let mut volt_columns = vec![None; actuators];
+    let mut columns = vec![None; names.len()];
+    for (at, header) in headers.iter().enumerate() {
+        let voltage = header.strip_prefix('v').and_then(|rest| rest.strip_suffix("_v")).and_then(|n| n.parse::<usize>().ok());
+        let slot = if header == "t_s" {
+            &mut time_column
+        } else if let Some(n) = voltage {
+            let reason =
+                format!("there is a voltage {header}, but the robot has {actuators} actuators; is this a run of another robot?");
+            n.checked_sub(1).and_then(|n| volt_columns.get_mut(n)).ok_or_else(|| wrong(1, at + 1, reason))?
+        } else if let Some(n) = names.iter().position(|name| name == header) {
+            &mut columns[n]
+        } else {
+            let known = markers.iter().map(|marker| marker.name.as_str()).collect::<Vec<_>>().join(", ");
+            let reason =
+                format!("{header:?} is neither t_s, a voltage v1_v, ..., nor NAME_x_mm or NAME_z_mm of a marker ({known})");
+            return Err(wrong(1, at + 1, reason));
+        };
+        if slot.replace(at).is_some() {
+            return Err(wrong(1, at + 1, format!("a second column {header}")));
+        }
+    }
+    let time_column = time_column.ok_or_else(|| wrong(1, 0, "the column t_s is missing".into()))?;
+    let volt_columns: Vec<usize> = volt_columns
+        .into_iter()
+        .enumerate()
+        .map(|(i, column)| {
+            column.ok_or_else(|| wrong(1, 0, format!("the column v{}_v is missing; the robot has {actuators} actuators", i + 1)))
+        })
+        .collect::<Result<_, _>>()?;
+    if columns.iter().all(Option::is_none) {
+        return Err(wrong(1, 0, "there is no column of a marker".into()));
+    }
+
+    let (mut times, mut voltages): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut channels: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
+    for record in reader.records() {
+        let record = record.map_err(|error| {
+            let line = error.position().map_or(0, csv::Position::line);
+            wrong(line.max(1), 0, error.to_string())
+        })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |column: usize| {
+            let text = record.get(column).unwrap_or_default();
+            let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+            value.ok_or_else(|| {
+                wrong(line, column + 1, format!("{}: {text:?} is not a number", headers.get(column).unwrap_or_default()))
+            })
+        };
+        let within = |column: usize, most: f64, unit: &str| {
+            let value = number(column)?;
+            if value.abs() <= most {
+                return Ok(value);
+            }
+            let name = headers.get(column).unwrap_or_default();
+            Err(wrong(line, column + 1, format!("{name} is {}, beyond {most:.0} {unit}; is it in {unit}?", words::number(value))))
+        };
+        let time = within(time_column, MOST_SECONDS, "s")?;
+        if times.last().is_some_and(|last| time - last < LEAST_SECONDS) {
+            let last = times[times.len() - 1];
+            return Err(wrong(
+                line,
+                time_column + 1,
+                format!(
+                    "t_s is {} after {}; times must rise, by {LEAST_SECONDS:e} s at least",
+                    words::number(time),
+                    words::number(last)
+                ),
+            ));
+        }
+        times.push(time);
+        for &column in &volt_columns {
+            let voltage = within(column, MOST_VOLTS, "V")?;
+            check_voltage(voltage)
+                .map_err(|reason| wrong(line, column + 1, format!("{} {reason}", headers.get(column).unwrap_or_default())))?;
+            voltages.push(voltage);
+        }
+        for (channel, column) in channels.iter_mut().zip(&columns) {
+            if let Some(column) = *column {
+                let empty = record.get(column).unwrap_or_default().is_empty();
+                channel.push(if empty { f64::NAN } else { within(column, MOST_MM, "mm")? });
+            }
+        }
+    }
+    if times.is_empty() {
+        return Err(wrong(1, 0, "there are no rows below the header".into()));
+    }
+    if times.len() == 1 {
+        return Err(wrong(2, 0, "there is one row; a run needs two at least".into()));
+    }
+    if channels.iter().flatten().all(|value| value.is_nan()) {
+        return Err(wrong(2, 0, "all values of all markers are missing".into()));
+    }
+    let mut remarks = Vec::new();
+    let missing = channels.iter().flatten().filter(|value| value.is_nan()).count();
+    if missing > 0 {
+        remarks.push(format!("{missing} values are missing"));
+    }
+    let largest = times.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    if let Some(median) = median_interval(&times).filter(|median| largest > 5.0 * median) {
+        remarks.push(format!("the largest gap between rows is {largest:.4} s, the usual step {median:.4} s"));
+    }
+    Ok(Rows { times, voltages, channels, remarks })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn markers() -> Vec<Marker> {
+        vec![Marker { name: "tip".into(), position: 10.0 }]
+    }
+
+    #[test]
+    fn columns_may_stand_in_any_order_and_cells_may_be_empty() {
+        let text = b"tip_z_mm, v1_v, t_s\n1.5, 10, 0\n, 20, 0.1\n";
+        let Rows { times, voltages, channels, remarks } = parse(text, 1, &markers(), |_| Ok(())).unwrap();
+        assert_eq!((times, voltages), (vec![0.0, 0.1], vec![10.0, 20.0]));
+        assert!(channels[0].is_empty() && channels[1][0] == 1.5 && channels[1][1].is_nan());
+        assert_eq!(remarks.len(), 1);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_line_and_column() {
+        for (text, line, column, words) in [
+            ("", 0, 0, "is empty"),
+            ("t_s,v1_v,tip_z_mm\n", 1, 0, "no rows"),
+            ("t_s,tip_z_mm\n0,1\n", 1, 0, "v1_v is missing"),
+            ("t_s,v1_v,v2_v,tip_z_mm\n0,1,1,1\n", 1, 3, "another robot"),
+            ("t_s,v1_v,nose_z_mm\n0,1,1\n", 1, 3, "nose_z_mm"),
+            ("t_s,v1_v,tip_z_mm\n0,1,1\n0,1,1\n", 3, 1, "times must rise"),
+            ("t_s,v1_v,tip_z_mm\n0,1,one\n", 2, 3, "\"one\" is not a number"),
+            ("t_s,v1_v,tip_z_mm\n0,,1\n", 2, 2, "is not a number"),
+            ("t_s,v1_v,tip_z_mm\n0,1,\n1,1,\n", 2, 0, "all values"),
+            ("t_s,v1_v\n0,1\n", 1, 0, "no column of a marker"),
+            ("t_s,v1_v,tip_z_mm\n0,1\n", 2, 0, "fields"),
+        ] {
+            let error = parse(text.as_bytes(), 1, &markers(), |_| Ok(())).unwrap_err();
+            assert!(error.reason.contains(words) && (error.line, error.column) == (line, column), "{text:?}: {error:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_run_or_an_error_but_never_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), head in any::<bool>()) {
+            let mut text = if head { b"t_s,v1_v,tip_z_mm\n".to_vec() } else { Vec::new() };
+            text.extend(bytes);
+            let _ = parse(&text, 1, &markers(), |_| Ok(()));
+        }
+    }
+}
