@@ -1,30 +1,39 @@
-//! Files of the program: read up to a limit; written whole or not at all, through links, to streams as they are.
+//! File access: reads up to a limit; atomic writes through links; plain writes to streams.
 //!
-//! A regular file is replaced by renaming a temporary one, `.NAME.sfers-tmp`, which stands in the same folder while it is written, locked.
-//! One that a kill left behind is not locked; whoever writes the same file next takes it away.
+//! A regular file is replaced by renaming a temporary one, `.NAME.sfers-tmp` in the same folder, which is locked while it is written. One that a
+//! killed process left is not locked; the next process that writes the same file removes it.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The largest file that is read (bytes): above all that the program writes.
+/// Largest file that is read (bytes); the program writes smaller ones.
 const LARGEST_FILE: u64 = 4 << 30;
-/// The most that is read from a pipe or a device, which may have no end (bytes).
+/// Largest input from a pipe or a device, which may be endless (bytes).
 const LARGEST_STREAM: u64 = 1 << 30;
 
-/// Reads a file or a stream to its end, up to a limit.
+/// Reads a file or a stream to its end.
+///
+/// # Errors
+/// If it cannot be read, or is larger than the limit.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let there = file.metadata()?;
     read_to_limit(file, if there.is_file() { LARGEST_FILE } else { LARGEST_STREAM })
 }
 
-/// The same as text.
+/// Reads a file or a stream as UTF-8 text.
+///
+/// # Errors
+/// As [`read`], and with the line if the content is not UTF-8.
 pub(crate) fn read_text(path: &Path) -> io::Result<String> {
     text(read(path)?)
 }
 
-/// The same of standard input.
+/// Reads standard input as UTF-8 text.
+///
+/// # Errors
+/// As [`read_text`].
 pub(crate) fn read_stdin() -> io::Result<String> {
     text(read_to_limit(io::stdin().lock(), LARGEST_STREAM)?)
 }
@@ -44,19 +53,26 @@ fn text(bytes: Vec<u8>) -> io::Result<String> {
     })
 }
 
-/// A digest of content, to notice changes: 64-bit FNV-1a and the length. It is no protection against forgery.
+/// A digest to detect changes: 64-bit FNV-1a and the length. It is not cryptographic.
 pub(crate) fn digest(bytes: &[u8]) -> String {
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3));
     format!("{hash:016x}, {} bytes", bytes.len())
 }
 
-/// Whether an error of locking says that the file system has no locks (ENOTSUP, ENOSYS, ENOLCK), as on Lustre without flock.
+/// True if a locking error means that the file system has no locks (ENOTSUP, ENOSYS, ENOLCK), as Lustre without flock.
 pub(crate) fn cannot_lock(error: &io::Error) -> bool {
     const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
     error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(ENOLCK)
 }
 
-/// An output on its way.
+/// The path with a suffix after its extension, as `a.csv.manifest.json`.
+pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
+}
+
+/// An output that is checked but not yet written.
 #[derive(Debug)]
 pub(crate) struct Pending {
     path: PathBuf,
@@ -67,12 +83,15 @@ pub(crate) struct Pending {
 enum To {
     /// A pipe or a character device, open.
     Stream(File),
-    /// The regular file to replace, links resolved.
+    /// The regular file to replace, with links resolved.
     File(PathBuf),
 }
 
 impl Pending {
-    /// Makes sure that `path` can be written, without touching what is there. A named pipe is opened, which waits for its reader.
+    /// Checks that `path` can be written, without changing it. A named pipe is opened, which waits for its reader.
+    ///
+    /// # Errors
+    /// If it is a folder, a socket or a block device, or cannot be written.
     pub(crate) fn open(path: &Path) -> io::Result<Self> {
         let to = match fs::metadata(path) {
             Ok(there) if there.is_file() => To::File(fs::canonicalize(path)?),
@@ -83,23 +102,26 @@ impl Pending {
             Err(error) => return Err(error),
         };
         if let To::File(path) = &to {
-            // A kill during the work that follows leaves nothing behind.
+            // A process killed during its work leaves no temporary file.
             drop(Temporary::beside(path)?);
         }
         Ok(Self { path: path.into(), to })
     }
 
-    /// Where the output goes, as it was given.
+    /// The path as it was given.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether it is a pipe or a device, beside which no file belongs.
+    /// True if the output is a pipe or a device, beside which no other file is written.
     pub(crate) fn is_stream(&self) -> bool {
         matches!(self.to, To::Stream(_))
     }
 
-    /// Writes all of it; a file then replaces the one at its place, with that one's mode, or else as the umask wants it.
+    /// Writes all bytes; a regular file replaces the previous one and keeps its mode, otherwise the umask's.
+    ///
+    /// # Errors
+    /// If the bytes cannot be written; the previous file is then unchanged.
     pub(crate) fn finish(self, bytes: &[u8]) -> io::Result<()> {
         let path = match self.to {
             To::Stream(mut stream) => return stream.write_all(bytes).and_then(|()| stream.flush()),
@@ -111,7 +133,7 @@ impl Pending {
             temporary.file.set_permissions(there.permissions())?;
         }
         temporary.file.write_all(bytes)?;
-        // Some file systems report a full disk no earlier.
+        // Some file systems report a full disk only here.
         temporary.file.sync_all()?;
         fs::rename(&temporary.path, &path)?;
         temporary.renamed = true;
@@ -119,10 +141,10 @@ impl Pending {
     }
 }
 
-/// The path that a chain of links ends at, where nothing may be yet.
+/// The end of a chain of links, which need not exist.
 fn end_of_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
-    // As many as Linux follows; more are a loop.
+    // Linux follows 40 links; more are a loop.
     for _ in 0..40 {
         match fs::read_link(&path) {
             Ok(target) => path = folder_of(&path).join(target),
@@ -136,7 +158,7 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A temporary file of this process alone; taken away unless it was renamed.
+/// A temporary file of this process, removed unless it was renamed.
 #[derive(Debug)]
 struct Temporary {
     path: PathBuf,
@@ -145,18 +167,18 @@ struct Temporary {
 }
 
 impl Temporary {
-    /// A new one beside `path`. Several processes get several; those of dead processes are taken away.
+    /// Creates a temporary file beside `path`, one per process; removes those of dead processes.
     fn beside(path: &Path) -> io::Result<Self> {
         let mut number = 1;
-        // Far more than processes write one file at a time.
+        // Above the number of processes that write one file at a time.
         for _ in 0..1000 {
             let path = temporary_name(path, number);
             match OpenOptions::new().write(true).create_new(true).open(&path) {
                 Ok(file) => match file.try_lock() {
                     Ok(()) if is_at(&file, &path) => return Ok(Self { path, file, renamed: false }),
-                    // Another process took it for one left behind, before it was locked.
+                    // Another process removed it before it was locked.
                     Ok(()) | Err(TryLockError::WouldBlock) => {}
-                    // Without locks nobody takes it away.
+                    // Without locks no process removes it.
                     Err(TryLockError::Error(error)) if cannot_lock(&error) => return Ok(Self { path, file, renamed: false }),
                     Err(TryLockError::Error(error)) => {
                         let _ = fs::remove_file(&path);
@@ -184,7 +206,7 @@ impl Drop for Temporary {
     }
 }
 
-/// Takes away a temporary file whose process has died. False if it is in use, or not ours to judge.
+/// Removes a temporary file of a dead process. False if it is in use or cannot be checked.
 fn left_behind(path: &Path) -> bool {
     match fs::symlink_metadata(path) {
         Err(_) => return true,
@@ -193,7 +215,7 @@ fn left_behind(path: &Path) -> bool {
     }
     let Ok(file) = OpenOptions::new().write(true).open(path) else { return !path.exists() };
     match file.try_lock() {
-        // Without the check, a file that was just renamed to its place would be taken away from there.
+        // The check protects a file that was just renamed to its place.
         Ok(()) if is_at(&file, path) => fs::remove_file(path).is_ok(),
         Ok(()) => true,
         Err(_) => false,
@@ -202,7 +224,7 @@ fn left_behind(path: &Path) -> bool {
 
 fn temporary_name(path: &Path, number: u32) -> PathBuf {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    // Names have 255 bytes at most.
+    // Names have at most 255 bytes.
     let end = (0..=name.len().min(200)).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
     let number = if number == 1 { String::new() } else { format!("{number}.") };
     folder_of(path).join(format!(".{}.{number}sfers-tmp", &name[..end]))
@@ -214,12 +236,12 @@ mod system {
     use std::os::unix::fs::{FileTypeExt, MetadataExt, fchown};
     use std::path::Path;
 
-    /// Whether a file is a pipe or a character device.
+    /// True if a file is a pipe or a character device.
     pub fn is_stream(there: &Metadata) -> bool {
         there.file_type().is_fifo() || there.file_type().is_char_device()
     }
 
-    /// Whether an open file is the one that a path leads to.
+    /// True if an open file is the one at a path.
     pub fn is_at(file: &File, path: &Path) -> bool {
         let identity = |data: Metadata| (data.dev(), data.ino());
         match (file.metadata(), std::fs::symlink_metadata(path)) {
@@ -228,7 +250,7 @@ mod system {
         }
     }
 
-    /// Gives a file the owner and group of the one that it replaces, where this process may.
+    /// Gives a file the owner and group of the one that it replaces, if permitted.
     pub fn keep_owner(file: &File, there: &Metadata) {
         let _ = fchown(file, Some(there.uid()), Some(there.gid()));
     }
@@ -252,34 +274,37 @@ mod system {
 
 use system::{is_at, is_stream, keep_owner};
 
-/// A folder that one process at a time writes to: a locked file `.sfers-lock` in it, which goes when the work is done.
+/// Exclusive access to a folder, by a locked file `.sfers-lock` in it that is removed at the end.
 #[derive(Debug)]
 pub(crate) struct FolderLock {
     path: PathBuf,
-    /// Holds the lock.
+    /// Keeps the lock.
     _file: File,
 }
 
-/// What came of locking a folder.
+/// Result of locking a folder.
 #[derive(Debug)]
 pub(crate) enum Locking {
-    /// This process has the folder.
+    /// This process has the lock.
     Locked(FolderLock),
-    /// Another process has it.
+    /// Another process has the lock.
     Busy,
     /// The file system has no locks.
     Unsupported,
 }
 
 impl FolderLock {
-    /// Locks a folder that is there.
+    /// Locks an existing folder.
+    ///
+    /// # Errors
+    /// If the lock file cannot be opened or locked.
     pub(crate) fn take(folder: &Path) -> io::Result<Locking> {
         let path = folder.join(".sfers-lock");
         for _ in 0..1000 {
             let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path)?;
             match file.try_lock() {
                 Ok(()) if is_at(&file, &path) => return Ok(Locking::Locked(Self { path, _file: file })),
-                // Its process ended and took it away in between.
+                // Its process ended and removed it in between.
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => return Ok(Locking::Busy),
                 Err(TryLockError::Error(error)) if cannot_lock(&error) => {

@@ -1,12 +1,37 @@
-//! Words for messages: numbers, names that are nearly right, and what parsers say in plain English.
+//! Texts of messages: numbers, units of names, suggestions for unknown names, and parser errors in plain English.
 
-/// A number as people write it: `1e300`, not three hundred digits; `5`, not `5.0`.
+/// Suffixes of names and their units; a suffix stands before those that it ends in.
+const UNITS: [(&str, &str); 16] = [
+    ("_mm_per_s", "mm/s"),
+    ("_v_per_s", "V/s"),
+    ("_per_s", "1/s"),
+    ("_pm_per_v", "pm/V"),
+    ("_g_cm3", "g/cm³"),
+    ("_mm_s", "mm/s"),
+    ("_m_s2", "m/s²"),
+    ("_gpa", "GPa"),
+    ("_deg", "°"),
+    ("_um", "µm"),
+    ("_kv_mm", "kV/mm"),
+    ("_mm", "mm"),
+    ("_hz", "Hz"),
+    ("_erg", "erg"),
+    ("_s", "s"),
+    ("_v", "V"),
+];
+
+/// A name without its suffix, and the unit of the suffix; `None` for dimensionless quantities.
+pub(crate) fn split_unit(name: &str) -> Option<(&str, &'static str)> {
+    UNITS.iter().find_map(|(suffix, unit)| Some((name.strip_suffix(suffix)?, *unit)))
+}
+
+/// The shortest notation of a number: `1e300` without three hundred digits; `5` without `.0`.
 pub(crate) fn number(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// The known name nearest to `name`, if it is near: an edit or two, or only the unit is missing.
+/// The known name with the fewest edits from `name`, if they are few or only the unit is missing.
 fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |name: &str| name.to_lowercase().replace('-', "_");
     let wanted = plain(name);
@@ -14,24 +39,23 @@ fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&
     let distance = |known: &str| {
         let known = plain(known);
         let without_unit = !wanted.is_empty() && known.strip_prefix(&wanted).is_some_and(|rest| rest.starts_with('_'));
-        // Its time is the product of the lengths, and the names are those of a program.
         if without_unit { 1 } else { strsim::osa_distance(&wanted, &known) }
     };
     let near = |known: &'a str| Some((distance(known), known)).filter(|(distance, _)| *distance <= allowed);
     known.into_iter().filter_map(near).min_by_key(|(distance, _)| *distance).map(|(_, known)| known)
 }
 
-/// `; did you mean X?`, or nothing if no known name is near.
+/// `; did you mean X?`; empty if no known name is near.
 pub(crate) fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     nearest(name, known).map_or_else(String::new, |known| format!("; did you mean {known}?"))
 }
 
-/// The message of a value that is not among the choices.
+/// The message for a value that is not among the choices.
 pub(crate) fn not_one_of(value: &str, choices: &[&str]) -> String {
     format!("{value:?} is not one of {}{}", choices.join(", "), did_you_mean(value, choices.iter().copied()))
 }
 
-/// What the TOML parser found, with the line, column and text that it shows, but without names of Rust's types.
+/// The TOML parser's error with line, column and text, without names of Rust types.
 pub(crate) fn toml_error(error: &toml::de::Error) -> String {
     let whole = error.to_string();
     let (whole, message) = (whole.trim_end(), error.message());
@@ -41,7 +65,7 @@ pub(crate) fn toml_error(error: &toml::de::Error) -> String {
     }
 }
 
-/// What the JSON parser found, likewise.
+/// The JSON parser's error with line and column, without names of Rust types.
 pub(crate) fn json_error(error: &serde_json::Error) -> String {
     let text = error.to_string();
     match text.rsplit_once(" at line ") {
@@ -50,7 +74,7 @@ pub(crate) fn json_error(error: &serde_json::Error) -> String {
     }
 }
 
-/// A message of serde in plain words. It has a handful of forms, and what has none of them is left as it is.
+/// A message of serde in plain words; unknown forms are left unchanged.
 fn plain(message: &str) -> String {
     if let Some((name, known)) = named(message, "unknown field `") {
         let hint = did_you_mean(name, known.iter().copied());
@@ -76,13 +100,13 @@ fn plain(message: &str) -> String {
 /// The name after `start`, and the names in backticks after "expected".
 fn named<'a>(message: &'a str, start: &str) -> Option<(&'a str, Vec<&'a str>)> {
     let rest = message.strip_prefix(start)?;
-    // A quoted key may hold backticks itself; what follows the name is serde's.
+    // A quoted key may contain backticks; the text after the name is serde's.
     let end = rest.rfind("`, expected ").or_else(|| rest.rfind("`, there are no")).or_else(|| rest.rfind('`'))?;
     let known = rest[end + 1..].split('`').skip(1).step_by(2).collect();
     Some((&rest[..end], known))
 }
 
-/// What serde found: `floating point `1.5``, `string "x"`, `map` and so on.
+/// The value that serde found (`floating point `1.5``, `string "x"`, `map`) in plain words.
 fn kind_found(found: &str) -> String {
     let inner = |start: &str| found.strip_prefix(start).and_then(|rest| rest.strip_suffix('`'));
     if let Some(value) = inner("floating point `") {
@@ -98,7 +122,7 @@ fn kind_found(found: &str) -> String {
     }
 }
 
-/// What serde expected, by the name of the Rust type.
+/// The kind of value that serde expected, from the name of the Rust type.
 fn kind_needed(expected: &str) -> &str {
     match expected {
         "f64" => "a number",
@@ -115,6 +139,22 @@ fn kind_needed(expected: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_unit_is_that_of_the_longest_suffix() {
+        for (name, split) in [
+            ("width_mm", Some(("width", "mm"))),
+            ("max_field_kv_mm", Some(("max_field", "kV/mm"))),
+            ("rate_v_per_s", Some(("rate", "V/s"))),
+            ("speed_mm_s", Some(("speed", "mm/s"))),
+            ("steps", None),
+        ] {
+            assert_eq!(split_unit(name), split);
+        }
+        for (i, (suffix, _)) in UNITS.iter().enumerate() {
+            assert!(UNITS[..i].iter().all(|(earlier, _)| !suffix.ends_with(earlier)), "{suffix} is never found");
+        }
+    }
 
     #[test]
     fn numbers_are_written_as_people_write_them() {

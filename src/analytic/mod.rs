@@ -1,4 +1,4 @@
-//! Closed-form results that the program, its tests and its documents compare with.
+//! Analytic results: beam frequencies, bending waves, stable time steps.
 
 mod stability;
 
@@ -6,13 +6,13 @@ pub use stability::{highest_joint_frequency, stable_step, stable_step_at};
 
 use crate::model::{Laminate, Robot};
 
-/// First natural frequency (Hz) of a clamped Euler-Bernoulli beam, the limit of the cantilever for many joints.
+/// First natural frequency (Hz) of a clamped Euler-Bernoulli beam, the limit of the cantilever with many joints.
 ///
 /// ```text
 /// f₁ = 3.5160/(2π L²) · √(EI/μ)
 /// ```
 ///
-/// EI per unit width, μ mass per area, L the beam's length (the robot's, if it has several actuators).
+/// EI: flexural rigidity per unit width, μ: mass per area, L: length of the robot.
 ///
 /// # References
 /// Any text on vibrations; also the reference's `model_resonant_frequencies`.
@@ -22,7 +22,7 @@ pub fn cantilever_frequency(robot: &Robot) -> f64 {
     3.5160 * (laminate.flexural_rigidity / laminate.areal_density).sqrt() / length.powi(2) / (2.0 * std::f64::consts::PI)
 }
 
-/// The first `count` natural frequencies (Hz) of the same beam.
+/// The first `count` natural frequencies (Hz) of a clamped Euler-Bernoulli beam as long as the robot.
 ///
 /// ```text
 /// f_i = (λ_i L)²/(2π L²) · √(EI/μ),    cos x cosh x = −1 at x = λ_i L
@@ -49,10 +49,10 @@ pub fn cantilever_frequencies(robot: &Robot, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Phase velocity (cm/s) of bending waves of frequency `frequency` (Hz) along the sheet.
+/// Phase velocity (cm/s) of bending waves of `frequency` (Hz) along the sheet.
 ///
 /// ```text
-/// c = (EI ω²/μ)^(1/4),    EI per unit width, μ mass per area
+/// c = (EI ω²/μ)^(1/4),    EI: flexural rigidity per unit width, μ: mass per area
 /// ```
 ///
 /// # References

@@ -1,17 +1,20 @@
-//! The largest stable time step of torques that act with the state of a step's beginning, in time linear in the number of joints.
+//! The largest stable time step of torques evaluated at the start of a step, in O(n) for n joints.
+//!
+//! A step or frequency is bisected; each trial factorises the mass matrix with its springs and dampers by the articulated-body recursion, O(n), and
+//! checks the pivots (Sylvester's law of inertia).
 
 use nalgebra::SMatrix;
 
 use crate::model::{DRY_FRICTION_RATE, LOSS_TIMES, Mount, Robot};
 
-/// Share of the result that bisections end at.
+/// Relative width at which a bisection ends.
 const PRECISION: f64 = 1e-15;
-/// Frequencies that a robot with material loss (a generalised Maxwell chain) is tested at, and the lowest as a share of the highest.
+/// Number of frequencies at which a robot with material loss (a generalised Maxwell chain) is tested, and the lowest relative to the highest.
 const FREQUENCIES: u32 = 24;
 const LOWEST_SHARE: f64 = 1e-4;
-/// Growth per step that counts as rounding.
+/// Growth per step that is attributed to rounding.
 const GROWTH: f64 = 1e-9;
-/// Doublings of the number of steps over which growth is followed: what a norm of 1e30 that is no growth adds per step is then below 1e-10.
+/// Squarings of the step matrix: a norm of 1e30 of a stable matrix then adds less than 1e-10 per step.
 const SQUARINGS: u32 = 40;
 
 /// A body in the vertical plane: mass (g), first moment about its left end (g·cm), inertia about its left end (g·cm²).
@@ -27,7 +30,7 @@ struct Chain {
     bodies: Vec<Inertia>,
     lengths: Vec<f64>,
     mount: Mount,
-    /// Of the clamp (dyn·cm/rad), if it gives.
+    /// Stiffness of a compliant clamp (dyn·cm/rad).
     clamp: Option<f64>,
 }
 
@@ -48,12 +51,12 @@ impl Chain {
         }
     }
 
-    /// Whether `scale`·M − `drag`·(turns of the bodies) + `joint`·(turns of the joints) + `clamp`·(turn of the clamp) is positive definite:
-    /// all pivots of the articulated-body recursion from the right end are positive.
+    /// True if `scale`·M − `drag`·A + `joint`·1 + `clamp`·E is positive definite, with A the unit matrix of the bodies' angles, 1 that of the joints
+    /// and E that of the clamp: all pivots of the articulated-body recursion, tip to base, are positive.
     fn is_positive(&self, scale: f64, drag: f64, joint: f64, clamp: f64) -> bool {
         let mut outboard = Inertia::default();
         for (i, (body, length)) in self.bodies.iter().zip(&self.lengths).enumerate().rev() {
-            // Articulated inertia of the bodies from here to the right end, about the left end of this one.
+            // Articulated inertia of the outboard bodies and this one, about its left end.
             let Inertia { mass, moment, about_end } = outboard;
             let articulated = Inertia {
                 mass: scale * body.mass + mass,
@@ -82,13 +85,13 @@ impl Chain {
         true
     }
 
-    /// Inertia about its joint of the last body: no smaller than the smallest eigenvalue of the joints' mass matrix.
+    /// Inertia of the last body about its joint (g·cm²): an upper bound of the smallest eigenvalue of the joints' mass matrix.
     fn last(&self) -> f64 {
         self.bodies.last().map_or(0.0, |body| body.about_end)
     }
 }
 
-/// The largest x up to `high` for which `holds` does, if it holds below some x only.
+/// The largest x up to `high` for which `holds(x)`, if `holds` is true below some x and false above.
 fn largest(high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(high) {
         return high;
@@ -104,13 +107,13 @@ fn largest(high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Largest angular frequency ω (rad/s) at which the flat robot's joints vibrate against their springs, without contact.
+/// Largest natural frequency ω (rad/s) of the flat robot's joints on their springs, without contact.
 ///
 /// ```text
-/// det(K − ω² M) = 0,   K = k·1,   M the mass matrix of the joints, the base held or eliminated
+/// det(K − ω² M) = 0,   K = k·1,   M: mass matrix of the joints with the base fixed or eliminated
 /// ```
 ///
-/// A clamp that gives counts as a hinge.
+/// A compliant clamp counts as a hinge. O(n) for n joints; relative error below 1e-10 against the dense eigenvalue problem.
 pub fn highest_joint_frequency(robot: &Robot) -> f64 {
     let chain = Chain::new(robot);
     // K is a multiple of the unit matrix: the largest ω² is k over the smallest eigenvalue of M.
@@ -118,7 +121,7 @@ pub fn highest_joint_frequency(robot: &Robot) -> f64 {
     (robot.joint().stiffness / smallest).sqrt()
 }
 
-/// Largest time step (s) for which the torque law, evaluated at the start of each step, is stable.
+/// Largest time step (s) at which the torque law, evaluated at the start of each step, is stable.
 ///
 /// Semi-implicit Euler with explicit damping, `M (v⁺ − v) = −h (C v + K θ)`, `θ⁺ = θ + h v⁺`, is stable as long as
 ///
@@ -126,18 +129,20 @@ pub fn highest_joint_frequency(robot: &Robot) -> f64 {
 /// 4 M − 2 h C − h² K    is positive definite
 /// ```
 ///
-/// for at its loss of definiteness a mode first alternates undiminished from step to step. For one mode of frequency ω with c = ηω² that is
-/// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require less.
+/// At the limit a mode alternates from step to step with constant amplitude. For one mode of frequency ω with c = ηω² the limit is
+/// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require a smaller step.
 ///
-/// The robot's extensions count: factors on stiffness, damping and mass, point masses, a clamp that gives (implicit, so that it adds `h²/c` at
-/// the root), dry friction in the joints with its slope at rest, viscous friction on the floor (bounded from above), the generalised Maxwell chain of material loss (by the
-/// spectral radius of a step at frequencies up to the highest). Hardening is left to [`stable_step_at`]; drag in air, whose rate
-/// stays below 1 % of 1/h at any speed that Bullet allows, is left out.
+/// The robot's extensions are included: factors on stiffness, damping and mass; point masses; a compliant clamp (implicit, so it adds `h²/c` at the
+/// base); dry friction of the joints with its slope at rest; viscous friction on the floor (an upper bound); material loss, by the spectral radius
+/// of a step at frequencies up to the highest. Hardening is left to [`stable_step_at`]. Air drag is neglected: its rate is below 1 % of 1/h at all
+/// speeds that Bullet allows.
+///
+/// O(n) for n joints. Without viscous friction and loss, where the limit is exact, its relative error is below 1e-10 against dense eigenvalues.
 pub fn stable_step(robot: &Robot) -> f64 {
     stable_step_at(robot, 0.0)
 }
 
-/// The same for joints bent elastically by `curvature` (1/cm), where they may be stiffer than flat ones.
+/// As [`stable_step`] (s), for joints bent elastically by `curvature` (1/cm), where hardening may make them stiffer.
 pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     let (chain, joint, extensions) = (Chain::new(robot), robot.joint(), &robot.extensions);
     // The slope of k δ (1 − a (δ/ℓ)²).
@@ -148,7 +153,7 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     let below = 0.5 * robot.collision_thickness;
     let mass: f64 = chain.bodies.iter().map(|body| body.mass).sum();
     let holds = |h: f64| {
-        // A floor's force −F_v (v + ω b) takes no more power than −2 F_v (v² + ω² b²); along itself the flat chain is rigid.
+        // The floor's force −F_v (v + ω b) has at most the power −2 F_v (v² + ω² b²); the flat chain is rigid along its length.
         4.0 * mass > 4.0 * h * viscous * chain.bodies.len() as f64
             && chain.is_positive(
                 4.0,
@@ -157,7 +162,7 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
                 h * h * chain.clamp.unwrap_or(0.0),
             )
     };
-    // Stable for the last body alone: √(c² + 4ω²) − c without cancellation.
+    // Limit of the last body alone: √(c² + 4ω²) − c without cancellation.
     let (omega2, c) = (stiffness / chain.last(), damping / chain.last());
     let step = largest(4.0 / ((c * c + 4.0 * omega2).sqrt() + c), holds);
     if extensions.loss == 0.0 {
@@ -170,10 +175,10 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     })
 }
 
-/// Whether a step of length `h` (s) lets no mode of the square `omega2` of its frequency (1/s²), with damping time `damping` (s), grow by the
-/// generalised Maxwell chain, which Bullet's engine turns on with the rates of the step's beginning.
+/// True if a mode with squared frequency `omega2` (1/s²) and damping time `damping` (s) does not grow at step `h` (s) with the generalised Maxwell
+/// chain, which the Bullet engine integrates explicitly.
 fn maxwell_chain_is_stable(omega2: f64, damping: f64, loss: f64, h: f64) -> bool {
-    // Rate times h, angle, q of each level.
+    // States: rate times h, angle, q of each branch.
     let mut step = SMatrix::<f64, 7, 7>::identity();
     let kick = h * h * omega2;
     step[(0, 0)] -= h * damping * omega2;
@@ -189,10 +194,10 @@ fn maxwell_chain_is_stable(omega2: f64, damping: f64, loss: f64, h: f64) -> bool
     spectral_radius(step) <= 1.0 + GROWTH
 }
 
-/// The largest absolute value of an eigenvalue, by Gelfand's formula `lim ‖Aⁿ‖^(1/n)` (‖·‖: the largest entry) with n doubled [`SQUARINGS`] times: unlike a QR iteration it ends
-/// for matrices of any scale.
+/// Spectral radius by Gelfand's formula `lim ‖Aⁿ‖^(1/n)` (‖·‖: largest entry), n doubled [`SQUARINGS`] times. Unlike a QR iteration it ends for
+/// matrices of any scale.
 fn spectral_radius(mut power: SMatrix<f64, 7, 7>) -> f64 {
-    // The logarithm of the norm, per step.
+    // Logarithm of the norm, per step.
     let (mut logarithm, mut share) = (0.0, 1.0);
     for _ in 0..SQUARINGS {
         let norm = power.amax();
@@ -235,9 +240,9 @@ mod tests {
         assert!((stable_step(&damped) * damped.damping.time() * omega * omega - 2.0).abs() < 1e-3);
     }
 
-    /// By the eigenvalues of the dense mass matrix, for every way to hold the robot and with masses on it.
+    /// Eigenvalues of the dense mass matrix for all mounts, with point masses.
     #[test]
-    fn the_highest_frequency_is_that_of_the_dense_mass_matrix() {
+    fn the_highest_frequency_and_the_stable_step_are_those_of_the_dense_mass_matrix() {
         for mount in [Mount::Clamped, Mount::Free, Mount::Ground] {
             for points in [vec![], vec![PointMass { mass: 0.7, position: 13.0 }, PointMass { mass: 0.2, position: 20.0 }]] {
                 let mut robot = robot(2, 4, mount, 0.0);
@@ -263,8 +268,14 @@ mod tests {
                 let base = mass.view((0, 0), (2, 2)).into_owned().try_inverse().unwrap();
                 let reduced = if mount == Mount::Clamped { own } else { own - coupling.transpose() * base * coupling };
                 let omega = (robot.joint().stiffness / reduced.symmetric_eigen().eigenvalues.min()).sqrt();
-                // The dense eigenvalue has lost four digits. Seen: at most 7e-13.
+                // The dense eigenvalue has lost four digits.
                 assert!((highest_joint_frequency(&robot) / omega - 1.0).abs() < 1e-10, "{mount:?}");
+                for eta in [0.0, 0.045, 10.0] {
+                    robot.damping = Damping::Eta(eta);
+                    let c = robot.joint().damping_time * omega * omega;
+                    let exact = 4.0 / ((c * c + 4.0 * omega * omega).sqrt() + c);
+                    assert!((stable_step(&robot) / exact - 1.0).abs() < 1e-10, "{mount:?}, {eta}");
+                }
             }
         }
     }
@@ -318,8 +329,7 @@ mod tests {
         largest
     }
 
-    /// What each effect does to stiffness, damping and masses moves the limit to where Bullet has it: 3 % below it a kick dies out, 3 % above it
-    /// grows until Bullet limits it (100 rad/s).
+    /// With each effect a kick decays at 3 % below the limit and grows at 3 % above it, up to Bullet's limit of 100 rad/s.
     #[test]
     fn bullet_is_stable_just_below_the_stable_step_and_not_above_it_with_every_effect() {
         let base = Extensions::default();
@@ -367,7 +377,7 @@ mod tests {
         let robot = robot(50, 200, Mount::Free, 0.045);
         let start = std::time::Instant::now();
         let h = stable_step(&robot);
-        // Seen: 10 ms; the eigenvalues of the dense matrix take minutes.
+        // The eigenvalues of the dense matrix take minutes.
         assert!(start.elapsed().as_secs_f64() < 2.0 && h > 0.0, "{:?}", start.elapsed());
     }
 }

@@ -21,12 +21,12 @@ pub struct Args {
     /// FILE.html or FILE.gif.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Speed to begin with (1: real time); by default one that takes some seconds.
+    /// Initial speed (1: real time); by default one for a duration of some seconds.
     #[arg(long, value_name = "X", value_parser = speed)]
     speed: Option<f64>,
 }
 
-/// Whether the input is an experiment rather than a recording of one.
+/// True if the input is an experiment, false if it is a recording.
 fn is_experiment(input: &Path) -> bool {
     let name = input.to_str().unwrap_or_default();
     let built_in = name.starts_with("preset:") || (!input.exists() && presets::text_of(name).is_some());
@@ -48,7 +48,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
             let source = source(&args.input, &[])?;
             let experiment = experiment::experiment(&source)?;
             let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
-            // A film of a run that went wrong is worth seeing, but not without a word.
+            // A failed run is animated too, with a warning.
             run.trouble(&experiment).iter().for_each(|trouble| say(&format!("warning: {trouble}")));
             (source.name, run.recording)
         }

@@ -1,4 +1,4 @@
-//! `sfers crosscheck`: the same experiment here and in the reference, compared bit by bit.
+//! `sfers crosscheck`: bitwise comparison with the reference.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,10 +15,10 @@ use crate::recording::{Recording, npz};
 ///
 /// Joint angles, rates and torques must have equal bits, node positions agree within 1e-5 cm. Without experiments a built-in set
 /// of fourteen is used; without --against, --pybullet or --sfers it is compared with recordings of the authors' code on PyBullet
-/// 3.2.7 that this program carries. Exit code 0 if all agree, 1 if not.
+/// 3.2.7 that are built in. Exit code 0 if all agree, 1 if not.
 ///
-/// With --engines the planar engine is compared with Bullet instead, by their measures; without experiments on a built-in set of ten. Each
-/// is run with twice its step too: what a measure changes by then is its step's error. Tips and resonances must agree within 0.1 %,
+/// With --engines the planar engine is compared with Bullet instead, by their measures; without experiments on a built-in set of ten. Each engine
+/// also runs with twice its step, for the step errors of the measures. Tips and resonances must agree within 0.1 %,
 /// heights within 1 % and strides within 3 %, beyond both errors. Where an engine gives no measures, or an error is above 10 %, there is no verdict,
 /// and the exit code is 1.
 ///
@@ -209,7 +209,7 @@ fn check(item: Item, args: &Args) -> Result<Outcome, Failure> {
         (None, None, None) => return Err(Failure::Usage("there is nothing to compare with".into())),
     };
     let run = experiment::run(&experiment, experiment.engine()?.as_mut(), |_| Control::Continue)?;
-    // Equal bits of a run that went wrong are equal bits.
+    // A failed run is compared too.
     run.trouble(&experiment).iter().for_each(|trouble| say(&format!("warning: {name}: {trouble}")));
     Ok(Outcome { name, against, report: compare(&run.recording, &theirs) })
 }
@@ -240,7 +240,7 @@ fn describe(outcome: &Outcome) -> String {
     text
 }
 
-/// A difference in units in the last place, where there are so few that the count tells more than the size.
+/// A small difference in units in the last place; empty for large ones.
 fn last_place(ulp: Option<u64>) -> String {
     match ulp {
         Some(1) => " (1 unit in the last place)".into(),

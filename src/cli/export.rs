@@ -8,15 +8,16 @@ use super::run::source;
 use super::{Failure, Options, print};
 use crate::experiment;
 use crate::export;
+use crate::files::with_suffix;
 
-/// Which format is written.
+/// Output format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     Urdf,
     Mjcf,
 }
 
-/// What both commands take.
+/// Arguments of both commands.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The experiment file, `-` for standard input, or preset:NAME (or NAME where there is no such file) for a built-in one.
@@ -29,7 +30,7 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// The command as typed, without folders, for the comment in the file.
+/// The command without folders, for the comment in the file.
 fn command(format: Format, args: &Args) -> String {
     let name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     let settings: String = args.settings.iter().map(|setting| format!(" --set {setting}")).collect();
@@ -51,9 +52,7 @@ pub fn run(format: Format, args: &Args, options: Options) -> Result<ExitCode, Fa
     }
     let file = pending(&args.out)?;
     if format == Format::Urdf && !file.is_stream() {
-        let mut beside = args.out.as_os_str().to_owned();
-        beside.push(".json");
-        let beside = pending(Path::new(&beside))?;
+        let beside = pending(&with_suffix(&args.out, ".json"))?;
         finish(beside, format!("{:#}\n", export::sidecar(&experiment, &command)).as_bytes())?;
     }
     finish(file, text.as_bytes())?;

@@ -49,13 +49,13 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The overview, and what else there is help on.
+/// The overview of commands and topics.
 fn commands() -> String {
     let overview = Cli::command().render_long_help();
     format!("{overview}\nMore: sfers help COMMAND, sfers help keys, sfers help measures\n")
 }
 
-/// The help of one command, as `sfers COMMAND --help` prints it.
+/// The help of a command, as by `sfers COMMAND --help`.
 fn command(name: &str) -> Result<String, Failure> {
     let mut all = Cli::command();
     // Gives the subcommands their full names and the global options.

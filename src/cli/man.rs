@@ -1,4 +1,4 @@
-//! `sfers man`: manual pages, of the same definitions as the help.
+//! `sfers man`: manual pages, from the definitions of the help.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,7 +67,7 @@ fn pages() -> Result<Vec<(String, u8, String)>, Failure> {
     Ok(pages)
 }
 
-/// A page that is begun: its title, and its name with a summary.
+/// The beginning of a page: title, name and summary.
 fn page(name: &str, section: &str, summary: &str) -> Roff {
     let mut page = Roff::new();
     page.control("TH", [name, section, "", concat!("sfers ", env!("CARGO_PKG_VERSION"))]);

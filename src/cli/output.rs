@@ -1,4 +1,4 @@
-//! Output files: opened before the work starts, written whole or not at all.
+//! Output files: checked before the work starts, written atomically.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -8,17 +8,17 @@ use serde_json::{Value, json};
 
 use super::Failure;
 use crate::experiment::{EngineKind, Experiment, StepChoice};
-use crate::files::Pending;
+use crate::files::{Pending, with_suffix};
 use crate::recording::{Recording, csv, npz};
 
-/// What a recording is written as.
+/// File format of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Npz,
     Csv,
 }
 
-/// Where a recording goes.
+/// Destination of a recording.
 pub struct Output {
     path: PathBuf,
     format: Format,
@@ -29,11 +29,11 @@ pub struct Output {
 /// The result and its manifest.
 struct Files {
     result: Pending,
-    /// None beside a pipe or a device.
+    /// `None` beside a pipe or a device.
     manifest: Option<Pending>,
 }
 
-/// The failure that a file cannot be written.
+/// The failure of a file that cannot be written.
 pub fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
     Failure::Usage(format!("{}: cannot be written: {reason}", path.display()))
 }
@@ -49,25 +49,23 @@ impl Output {
             Some("csv") => Format::Csv,
             _ => return Err(Failure::Usage(format!("{}: the name must end in .npz or .csv", path.display()))),
         };
-        let mut manifest = path.as_os_str().to_owned();
-        manifest.push(".manifest.json");
         let result = pending(path)?;
-        let manifest = if result.is_stream() { None } else { Some(pending(Path::new(&manifest))?) };
+        let manifest = if result.is_stream() { None } else { Some(pending(&with_suffix(path, ".manifest.json"))?) };
         let files = Files { result, manifest };
         Ok(Self { path: path.into(), format, files: Some(files) })
     }
 
-    /// Whether the recording goes to standard output, so that nothing else may.
+    /// True if the recording goes to standard output, which then takes nothing else.
     pub fn is_stdout(&self) -> bool {
         self.files.is_none()
     }
 
-    /// The file's name, if it is one.
+    /// The path, if it is not standard output.
     pub fn path(&self) -> Option<&Path> {
         self.files.is_some().then_some(self.path.as_path())
     }
 
-    /// Writes the recording and its manifest, and moves both to their places.
+    /// Writes the recording and its manifest.
     pub fn write(self, recording: &Recording, manifest: &Value) -> Result<(), Failure> {
         let mut bytes = Vec::new();
         match self.format {
@@ -93,7 +91,7 @@ pub fn finish(file: Pending, bytes: &[u8]) -> Result<(), Failure> {
     file.finish(bytes).map_err(|error| unwritable(&path, &error))
 }
 
-/// What made a result: command line, resolved experiment, versions, wall time.
+/// Provenance of a result: command line, resolved experiment, versions, wall time (s).
 pub fn manifest(experiment: &Experiment, step_choice: Option<&StepChoice>, wall_s: f64, interrupted: bool) -> Value {
     json!({
         "schema": 1,
@@ -125,7 +123,7 @@ pub fn manifest(experiment: &Experiment, step_choice: Option<&StepChoice>, wall_
 /// Date and time in UTC.
 #[derive(Debug, Clone, Copy)]
 pub struct DateTime {
-    /// Since 1970-01-01 00:00:00 (s).
+    /// Time since 1970-01-01 00:00:00 (s).
     seconds: u64,
 }
 
@@ -149,7 +147,7 @@ impl DateTime {
     }
 }
 
-/// Year, month and day of a number of days since 1970-01-01, counted off year by year and month by month.
+/// Year, month and day of a number of days since 1970-01-01.
 fn civil(mut days: u64) -> (u64, usize, u64) {
     let leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
     let mut year = 1970;

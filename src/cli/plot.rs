@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use super::output::{finish, pending};
 use super::{Failure, Options, print, say};
 use crate::recording::{Recording, csv, npz};
-use crate::view::{self, Figure, Kind, ResultsError, Size, View};
+use crate::view::{self, Figure, ImageError, Kind, ResultsError, Size, View};
 
 /// Draw a recording or the results of a sweep as SVG, PDF or PNG, in the size of a journal's column.
 ///
@@ -18,10 +18,10 @@ pub struct Args {
     /// The figure, FILE.svg, FILE.pdf or FILE.png; `-` is SVG on standard output.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// What of a recording is drawn.
+    /// Kind of figure of a recording.
     #[arg(long, value_enum, default_value = "shapes")]
     kind: Kind,
-    /// Which measure of results is drawn; by default the first, with those of the same unit.
+    /// Measure of results; by default the first, with those of the same unit.
     #[arg(long, value_name = "NAME")]
     measure: Option<String>,
     /// Draw only rows of results with this value of a varied key, such as --where friction.low=1.
@@ -30,7 +30,7 @@ pub struct Args {
     /// Draw a panel for each value of this varied key; by default results over three and more keys choose those with the fewest values.
     #[arg(long, value_name = "KEY")]
     by: Vec<String>,
-    /// Size on paper: one column of a journal (85 mm, letters of 8 pt), two (175 mm, 8 pt), or a page on a screen (170 mm, 9.5 pt).
+    /// Size on paper: one column of a journal (85 mm, text of 8 pt), two columns (175 mm, 8 pt), or a page on a screen (170 mm, 9.5 pt).
     #[arg(long, value_enum, default_value = "single")]
     size: Format,
     /// Another width (mm).
@@ -41,7 +41,7 @@ pub struct Args {
     dpi: f64,
 }
 
-/// Names of sizes.
+/// Sizes by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Format {
     Single,
@@ -61,12 +61,12 @@ fn within(low: f64, high: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
     }
 }
 
-/// What a file's name ends in.
+/// The extension of a path; empty without one.
 pub fn extension(path: &Path) -> &str {
     path.extension().and_then(|extension| extension.to_str()).unwrap_or("")
 }
 
-/// Reads a recording, FILE.npz or FILE.csv, with a word on what a CSV without its manifest leaves open.
+/// Reads a recording, FILE.npz or FILE.csv; warns of a CSV without its manifest.
 pub fn recording(path: &Path, options: Options) -> Result<Recording, Failure> {
     let recording = if extension(path) == "csv" {
         let (recording, open) = csv::read_file(path)?;
@@ -81,7 +81,7 @@ pub fn recording(path: &Path, options: Options) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
-/// The name of a file without its ending; for a sweep's results that of their folder.
+/// The name of a file without its extension; for `results.csv` of a sweep that of its folder.
 pub fn name(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default();
     let folder = path.parent().and_then(Path::file_name).filter(|_| stem == "results");
@@ -98,7 +98,7 @@ fn figure(args: &Args, options: Options) -> Result<Figure, Failure> {
             }
             let recording = recording(&args.input, options)?;
             if let (Kind::Spectrum, Some(problem)) = (args.kind, view::aliased(&recording)) {
-                // Even when quiet: what is drawn is not what moved.
+                // Also with --quiet: the figure does not show the motion.
                 say(&format!("warning: {problem}"));
             }
             Ok(args.kind.titled(&name(&args.input), &recording))
@@ -131,7 +131,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     };
     size.width_mm = args.width_mm.unwrap_or(size.width_mm);
     let svg = figure(args, options)?.size(size).svg();
-    let failed = |reason: String| Failure::Data(format!("{}: {reason}", args.input.display()));
+    let failed = |error: ImageError| Failure::Data(format!("{}: {error}", args.input.display()));
     let bytes = match kind {
         "pdf" => view::pdf(&svg).map_err(failed)?,
         "png" => view::png(&svg, args.dpi).map_err(failed)?,

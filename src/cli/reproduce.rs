@@ -1,4 +1,4 @@
-//! `sfers reproduce`: the paper's results beside this program's.
+//! `sfers reproduce`: reproduction of the paper's results.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,9 +12,9 @@ use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::reproduce::{Bench, Effort, Findings, STUDIES, Study, StudyError, page, table};
 use crate::words;
 
-/// The paper's results beside this program's: DIR/index.html, a figure and a table each.
+/// Reproduce the paper's results: DIR/index.html, with a figure and a table for each.
 ///
-/// Without IDs all of them. An interrupted reproduction goes on where it stopped.
+/// Without IDs all of them. The same command resumes an interrupted reproduction.
 ///
 /// Example: sfers reproduce --quick --out paper
 #[derive(Debug, clap::Args)]
@@ -70,21 +70,20 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     options.remark(&format!("{} results, about {:.0} min on {jobs} threads", studies.len(), (cost / jobs as f64 / 60.0).ceil()));
 
     let bench = Bench::new(effort, jobs, &rows, &INTERRUPT);
-    let mut results: Vec<(Study, Result<Findings, String>)> = Vec::new();
+    let mut results: Vec<(Study, Result<Findings, StudyError>)> = Vec::new();
     for study in studies {
         let start = Instant::now();
         let result = match study.run(&bench) {
             Err(StudyError::Interrupted) => {
-                say("interrupted; the same command goes on from here");
+                say("interrupted; the same command resumes the reproduction");
                 return Ok(ExitCode::from(INTERRUPTED));
             }
             Err(StudyError::Rows(error)) => return Err(error.into()),
-            Err(error) => Err(error.to_string()),
-            Ok(findings) => {
-                write(&folder.join(format!("{}.svg", study.id)), &findings.figure)?;
-                Ok(findings)
-            }
+            result => result,
         };
+        if let Ok(findings) = &result {
+            write(&folder.join(format!("{}.svg", study.id)), &findings.figure)?;
+        }
         options.remark(&format!("{}: {:.0} s", study.id, start.elapsed().as_secs_f64()));
         results.push((study, result));
     }
@@ -99,7 +98,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
                 "id": study.id, "title": study.title, "engines": findings.engines,
                 "published": findings.published, "comparisons": findings.comparisons,
             }),
-            Err(reason) => json!({"id": study.id, "title": study.title, "failed": reason}),
+            Err(reason) => json!({"id": study.id, "title": study.title, "failed": reason.to_string()}),
         })
         .collect();
     let object = json!({"schema": 2, "made_by": made_by, "results": entries});

@@ -27,7 +27,7 @@ pub struct Args {
     /// Override a key, for example robot.damping_eta=0.03. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
-    /// What steps the robot: bullet (bit for bit the reference) or planar (the fast one). Short for --set simulation.engine=NAME.
+    /// The engine: bullet (bit for bit the reference) or planar (the fast one). Short for --set simulation.engine=NAME.
     #[arg(long, value_name = "NAME")]
     engine: Option<String>,
     /// Take the bodies from a URDF: a chain of boxes with hinges about +y. `-` is standard input.
@@ -37,10 +37,10 @@ pub struct Args {
     /// does not on Bullet) or FILE.csv (units in the header, the nodes' own velocities); `-` is CSV on standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Save the state at the end, for another run to go on from.
+    /// Save the final state, from which another run can continue.
     #[arg(long, value_name = "FILE")]
     save_state: Option<PathBuf>,
-    /// Go on from a saved state of the same robot: the experiment's steps count from its beginning.
+    /// Continue from a saved state of the same robot; the steps of the experiment count from its beginning.
     #[arg(long, value_name = "FILE")]
     load_state: Option<PathBuf>,
 }
@@ -66,7 +66,8 @@ pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
     Ok(source)
 }
 
-pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+/// The experiment of the arguments, with the engine of `--engine` and the bodies of `--robot`.
+fn experiment_of(args: &Args) -> Result<Experiment, Failure> {
     let mut source = source(&args.experiment, &args.settings)?;
     if let Some(engine) = &args.engine {
         let key = "simulation.engine";
@@ -79,108 +80,38 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         }
         source.push(Setting { key: key.into(), value: engine.clone(), place: format!("--engine {engine}") });
     }
-    let experiment = match &args.robot {
-        None => experiment::experiment(&source)?,
-        Some(path) => {
-            if path == Path::new("-") && args.experiment == path.as_path() {
-                return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
-            }
-            let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
-            let text = read(path).map_err(|error| bad(error.to_string()))?;
-            let bodies =
-                export::bodies(&text, &experiment::experiment(&source)?.robot).map_err(|error| bad(error.to_string()))?;
-            experiment::with_bodies(&source, &bodies)?
-        }
-    };
+    let Some(path) = &args.robot else { return Ok(experiment::experiment(&source)?) };
+    if path == Path::new("-") && args.experiment == path.as_path() {
+        return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
+    }
+    let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
+    let text = read(path).map_err(|error| bad(error.to_string()))?;
+    let bodies = export::bodies(&text, &experiment::experiment(&source)?.robot).map_err(|error| bad(error.to_string()))?;
+    Ok(experiment::with_bodies(&source, &bodies)?)
+}
+
+pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
+    let experiment = experiment_of(args)?;
     let output = args.out.as_deref().map(Output::open).transpose()?;
     let state_file = args.save_state.as_deref().map(pending).transpose()?;
     let mut engine = experiment.engine()?;
     if let Some(path) = &args.load_state {
         load_state(path, &experiment, engine.as_mut())?;
     }
-
-    let mut warnings = Vec::new();
-    // Said before the run, which may take long; the run itself says it again, with its measures left out.
+    // A warning before the run, which may be long; the run repeats it and gives no measures.
     if let Some(stable) = experiment::unstable(&experiment, 0.0) {
         options.remark(&format!("warning: {}", experiment::step_too_long(experiment.time_step, stable)));
     }
-    // The first Ctrl-C ends the run in good order; without a handler (a second one in this process) it ends at once.
-    let _ = ctrlc::set_handler(|| INTERRUPT.store(true, Ordering::Relaxed));
-
     let first_step = engine.step();
-    let bar = progress(&experiment, options);
-    let start = Instant::now();
-    let mut remaining = Remaining::new(&experiment, first_step);
-    let result = experiment::run(&experiment, engine.as_mut(), |done| {
-        bar.set_position(done);
-        if let Some(text) = remaining.after(done, start.elapsed().as_secs_f64()) {
-            bar.suspend(|| options.remark(&text));
-        }
-        if INTERRUPT.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
-    });
-    let wall = start.elapsed().as_secs_f64();
-    bar.finish_and_clear();
-    let run = result?;
-    if let Some(choice) = &run.step_choice {
-        options.remark(&format!(
-            "steps of {:.1e} to {:.1e} s, local error {:.0e} cm: the {} changes by {:.1e} (allowed {:.0e}) from a ten times larger one",
-            choice.shortest_step_s, choice.longest_step_s, choice.tolerance_cm, choice.measure, choice.change, choice.asked
-        ));
-    }
-    let trouble = run.trouble(&experiment);
-    for problem in &trouble {
-        // Even when quiet: the result is not what was asked for.
-        say(&format!("warning: {problem}; no measures are given"));
-    }
-    let remarks = run.warnings(&experiment);
-    remarks.iter().for_each(|warning| say(&format!("warning: {warning}")));
-    let Run { mut recording, measures, interrupted, energy, audited, step_choice, .. } = run;
-    let steps = recording.meta.steps;
-    if interrupted {
-        let kept = if output.is_some() { "kept" } else { "not saved, for there is no --out" };
-        let message = format!("interrupted after {steps} of {} steps; what was recorded until then is {kept}", experiment.steps);
-        say(&message);
-        warnings.push(message);
-    }
-    if let Some(ground) = &mut recording.meta.ground {
+    let (mut run, wall) = simulate(&experiment, engine.as_mut(), options)?;
+    let warnings = warn(&experiment, &mut run, output.is_some(), options);
+    if let Some(ground) = &mut run.recording.meta.ground {
         ground.date_time = now().of_the_reference();
     }
-
-    let measures =
-        if trouble.is_empty() { measures } else { Measures { energy_error: measures.energy_error, ..Measures::default() } };
-    warnings.extend(trouble.into_iter().chain(remarks));
-    let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
-    let to_stdout = output.as_ref().is_some_and(Output::is_stdout);
     let saved = output.as_ref().and_then(Output::path).map(Path::to_owned);
-    let text = if options.json {
-        let object = json!({
-            "schema": 1,
-            "measures": measures,
-            "energy": audited.then_some(energy),
-            "time_step_s": experiment.time_step,
-            "step_choice": step_choice,
-            "steps": steps,
-            "records": recording.len(),
-            "simulated_s": steps as f64 * experiment.time_step,
-            "interrupted": interrupted,
-            "warnings": warnings,
-            "out": saved,
-            "wall_s": wall,
-            "steps_per_s": steps_per_s,
-        });
-        format!("{object}\n")
-    } else {
-        let measures: String =
-            measures.named().into_iter().map(|(name, value)| format!("{name} = {}\n", six_digits(value))).collect();
-        options.remark(&format!(
-            "{steps} steps of {:e} s in {wall:.2} s ({steps_per_s:.0} steps/s), {} records",
-            experiment.time_step,
-            recording.len()
-        ));
-        measures
-    };
-    // The measures come before the files, so that a full disk does not take them along; and a closed pipe takes no file along.
-    let printed = if to_stdout {
+    let text = describe(&experiment, &run, first_step, wall, &warnings, saved.as_deref(), options);
+    // Measures before files, so that a full disk does not lose them; a closed pipe does not lose the files.
+    let printed = if output.as_ref().is_some_and(Output::is_stdout) {
         options.remark(text.trim_end());
         Ok(())
     } else {
@@ -192,13 +123,99 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         finish(file, text.as_bytes())?;
     }
     if let Some(output) = output {
-        output.write(&recording, &manifest(&experiment, step_choice.as_ref(), wall, interrupted))?;
+        output.write(&run.recording, &manifest(&experiment, run.step_choice.as_ref(), wall, run.interrupted))?;
     }
     if let Some(path) = saved {
         options.remark(&format!("saved to {}", path.display()));
     }
     printed?;
-    Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+    Ok(if run.interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+}
+
+/// Runs the experiment with a progress bar until its end or Ctrl-C; returns the run and its wall time (s).
+fn simulate(experiment: &Experiment, engine: &mut dyn Engine, options: Options) -> Result<(Run, f64), Failure> {
+    // Fails for a second handler in the same process; Ctrl-C then ends the process.
+    let _ = ctrlc::set_handler(|| INTERRUPT.store(true, Ordering::Relaxed));
+    let bar = progress(experiment, options);
+    let start = Instant::now();
+    let mut remaining = Remaining::new(experiment, engine.step());
+    let result = experiment::run(experiment, engine, |done| {
+        bar.set_position(done);
+        if let Some(text) = remaining.after(done, start.elapsed().as_secs_f64()) {
+            bar.suspend(|| options.remark(&text));
+        }
+        if INTERRUPT.load(Ordering::Relaxed) { Control::Stop } else { Control::Continue }
+    });
+    let wall = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    Ok((result?, wall))
+}
+
+/// Reports what is wrong with a run on stderr and returns it; removes the measures of a run that went wrong.
+fn warn(experiment: &Experiment, run: &mut Run, has_output: bool, options: Options) -> Vec<String> {
+    if let Some(choice) = &run.step_choice {
+        options.remark(&format!(
+            "steps of {:.1e} to {:.1e} s, local error {:.0e} cm: the {} changes by {:.1e} (allowed {:.0e}) from a ten times larger one",
+            choice.shortest_step_s, choice.longest_step_s, choice.tolerance_cm, choice.measure, choice.change, choice.asked
+        ));
+    }
+    let mut warnings = Vec::new();
+    let trouble = run.trouble(experiment);
+    for problem in &trouble {
+        // Also with --quiet: the result is not the one wanted.
+        say(&format!("warning: {problem}; no measures are given"));
+    }
+    let remarks = run.warnings(experiment);
+    remarks.iter().for_each(|warning| say(&format!("warning: {warning}")));
+    if run.interrupted {
+        let kept = if has_output { "kept" } else { "not saved, because there is no --out" };
+        let steps = run.recording.meta.steps;
+        let message = format!("interrupted after {steps} of {} steps; what was recorded until then is {kept}", experiment.steps);
+        say(&message);
+        warnings.push(message);
+    }
+    if !trouble.is_empty() {
+        run.measures = Measures { energy_error: run.measures.energy_error, ..Measures::default() };
+    }
+    warnings.extend(trouble.into_iter().chain(remarks));
+    warnings
+}
+
+/// The measures as text, or the JSON object of `--json`.
+fn describe(
+    experiment: &Experiment,
+    run: &Run,
+    first_step: u64,
+    wall: f64,
+    warnings: &[String],
+    saved: Option<&Path>,
+    options: Options,
+) -> String {
+    let (steps, records) = (run.recording.meta.steps, run.recording.len());
+    let steps_per_s = (steps - first_step) as f64 / wall.max(1e-9);
+    if options.json {
+        let object = json!({
+            "schema": 1,
+            "measures": run.measures,
+            "energy": run.audited.then_some(run.energy),
+            "time_step_s": experiment.time_step,
+            "step_choice": run.step_choice,
+            "steps": steps,
+            "records": records,
+            "simulated_s": steps as f64 * experiment.time_step,
+            "interrupted": run.interrupted,
+            "warnings": warnings,
+            "out": saved,
+            "wall_s": wall,
+            "steps_per_s": steps_per_s,
+        });
+        return format!("{object}\n");
+    }
+    options.remark(&format!(
+        "{steps} steps of {:e} s in {wall:.2} s ({steps_per_s:.0} steps/s), {records} records",
+        experiment.time_step
+    ));
+    run.measures.named().into_iter().map(|(name, value)| format!("{name} = {}\n", six_digits(value))).collect()
 }
 
 fn load_state(path: &Path, experiment: &Experiment, engine: &mut dyn Engine) -> Result<(), Failure> {
@@ -214,11 +231,11 @@ fn load_state(path: &Path, experiment: &Experiment, engine: &mut dyn Engine) -> 
     state.load_into(engine).map_err(|error| bad(error.to_string()))
 }
 
-/// First time at which the time left is told (s), and how much must be left for it.
+/// Wall time of the first message about the remaining time (s), and the least remaining time for one (s).
 const TOLD_AFTER: f64 = 3.0;
 const WORTH_TELLING: f64 = 60.0;
 
-/// Tells how long a long run will take: once where stderr is a terminal with a bar, and otherwise again whenever the run has taken twice as long.
+/// Estimates the remaining time of a long run: once if stderr is a terminal with a bar, otherwise each time the wall time has doubled.
 struct Remaining {
     joints: usize,
     first: u64,
@@ -233,7 +250,7 @@ impl Remaining {
         Self { joints: experiment.robot.joints(), first, steps: experiment.steps, next: TOLD_AFTER, repeats }
     }
 
-    /// What there is to say after `done` steps and so many seconds.
+    /// The message due after `done` steps and `elapsed` wall time (s).
     fn after(&mut self, done: u64, elapsed: f64) -> Option<String> {
         if elapsed < self.next || done <= self.first {
             return None;
@@ -263,13 +280,13 @@ fn spoken(seconds: f64) -> String {
     format!("{value:.0} {unit}")
 }
 
-/// A value with six digits behind the point, and no minus sign before zeros.
+/// A value with six digits after the point; zero has no minus sign.
 fn six_digits(value: f64) -> String {
     let text = format!("{value:.6}");
     if text == "-0.000000" { "0.000000".into() } else { text }
 }
 
-/// A bar on stderr; indicatif hides it where stderr is no terminal.
+/// A progress bar on stderr; indicatif hides it if stderr is no terminal.
 fn progress(experiment: &Experiment, options: Options) -> ProgressBar {
     if options.quiet {
         return ProgressBar::hidden();

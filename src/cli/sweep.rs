@@ -13,7 +13,7 @@ use crate::sweep::{self, Outcome, RowError, Sweep};
 
 /// Run an experiment over a grid of values; results in DIR/results.csv.
 ///
-/// A sweep that was killed goes on where it stopped when it is started again.
+/// The same command resumes a sweep that was killed.
 ///
 /// Example: sfers preset jump-on-time-scan > scan.toml && sfers sweep scan.toml --out scan
 #[derive(Debug, clap::Args)]
@@ -26,16 +26,16 @@ pub struct Args {
     /// Number of runs at a time; by default one per processor.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Compute only every N-th point, beginning with the K-th, for another machine to do the others.
+    /// Compute only every N-th point, beginning with the K-th, and leave the others to other machines.
     #[arg(long, value_name = "K/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
-    /// Compute nothing: gather the rows-*.csv of all shards in DIR into DIR/results.csv, if no point is missing.
+    /// Compute nothing: collect the rows-*.csv of all shards in DIR into DIR/results.csv, if no point is missing.
     #[arg(long, conflicts_with_all = ["shard", "jobs"])]
     merge: bool,
     /// Override a key of the experiment, or the value of a key in [vary] that has only one. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
-    /// Keep the rows that another revision of the program, or another Bullet, computed in DIR, and go on with this one.
+    /// Keep the rows in DIR that another revision of the program, or one with another Bullet, computed, and continue with this one.
     #[arg(long)]
     keep_rows: bool,
 }
@@ -72,7 +72,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     let outcome = if args.merge { None } else { Some(compute(args, &sweep, options).map_err(advise)?) };
     let wall_s = start.elapsed().as_secs_f64();
     let interrupted = outcome.is_some_and(|outcome| outcome.interrupted);
-    // A shard that ends last finds all rows there; one that does not leaves the results to the merge.
+    // The last shard to end finds all rows; the others leave the results to the merge.
     let results = match sweep::merge(&args.out, &sweep) {
         Ok(path) => Some(path),
         Err(RowError::Incomplete { .. }) if !args.merge => None,
@@ -86,9 +86,9 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
         ));
     }
     if interrupted {
-        say("interrupted; the same command goes on from here");
+        say("interrupted; the same command resumes the sweep");
     } else if results.is_none() {
-        options.remark("other shards are missing; gather their rows-*.csv in one folder and use --merge");
+        options.remark("other shards are missing; collect their rows-*.csv in one folder and use --merge");
     }
     if options.json {
         let object = json!({
@@ -114,7 +114,7 @@ fn compute(args: &Args, sweep: &Sweep, options: Options) -> Result<Outcome, RowE
         bar.set_length(points as u64);
         bar.set_position(done as u64);
         if first.swap(false, Ordering::Relaxed) {
-            // Points of an earlier start are no measure of this one's speed.
+            // Points of earlier runs do not count for the speed.
             bar.reset_eta();
         }
     };

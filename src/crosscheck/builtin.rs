@@ -1,4 +1,4 @@
-//! The built-in set: the recordings of the reference that this program is judged by.
+//! The built-in set: recordings of the reference with their experiments.
 
 /// A recording with its experiment.
 #[derive(Debug, Clone, Copy)]
@@ -13,7 +13,7 @@ pub struct Builtin {
 
 macro_rules! builtin {
     ($($name:literal)*) => {
-        /// All of them, by name.
+        /// All recordings, by name.
         pub static BUILTIN: &[Builtin] = &[$(Builtin {
             name: $name,
             experiment: include_str!(concat!("../../tests/recordings/", $name, ".toml")),

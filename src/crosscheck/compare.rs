@@ -1,22 +1,22 @@
-//! Comparing two recordings number by number.
+//! Bitwise comparison of two recordings.
 
 use serde::Serialize;
 
 use super::{POSITION_TOLERANCE, VELOCITY_TOLERANCE};
 use crate::recording::Recording;
 
-/// From which share of a quantity's largest value on differences are counted in units in the last place.
+/// Share of a quantity's largest value from which differences are counted in units in the last place.
 pub const FAR: f64 = 1e-3;
 
-/// Where two recordings of one quantity differ.
+/// Difference of a quantity between two recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
-    /// How many values have other bits.
+    /// Number of values with different bits.
     pub values: usize,
-    /// The largest difference in units in the last place, of pairs that are both further from zero than [`FAR`] of the quantity's largest
-    /// value: nearer to zero the unit shrinks and the count says nothing. `None` if no such pair differs.
+    /// Largest difference in units in the last place, of pairs that both exceed [`FAR`] of the quantity's largest value: closer to zero the count is
+    /// meaningless. `None` if no such pair differs.
     pub largest_ulp: Option<u64>,
-    /// The largest difference in the quantity's unit; NaN if one side is not a number.
+    /// Largest difference in the quantity's unit; NaN if one side is not a number.
     pub largest: f64,
     /// Step of the first difference, counting from 0.
     pub first_step: u64,
@@ -27,26 +27,26 @@ pub struct Difference {
 /// The comparison of one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quantity {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
     /// Number of values compared.
     pub values: usize,
-    /// How far it may differ; 0 means equal bits.
+    /// Largest allowed difference, in the quantity's unit; 0 for equal bits.
     pub tolerance: f64,
     /// The difference, if the bits are not all equal.
     pub difference: Option<Difference>,
-    /// Whether it passes.
+    /// True if the difference is within the tolerance.
     pub passes: bool,
 }
 
 /// The comparison of two recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Whether all quantities pass.
+    /// True if all quantities pass.
     pub passes: bool,
-    /// What does not fit before any number is compared: sizes or settings. Empty if comparable.
+    /// Sizes or settings that differ, which prevents a comparison of values.
     pub mismatch: Vec<String>,
     /// The quantities.
     pub quantities: Vec<Quantity>,
@@ -84,7 +84,7 @@ pub fn compare(ours: &Recording, theirs: &Recording) -> Report {
     Report { passes: quantities.iter().all(|q| q.passes), mismatch, quantities }
 }
 
-/// Sizes and settings that make a comparison pointless.
+/// Sizes and settings that differ.
 fn mismatch(ours: &Recording, theirs: &Recording) -> Vec<String> {
     let (a, b) = (&ours.meta, &theirs.meta);
     let mut found = Vec::new();
@@ -102,8 +102,7 @@ fn mismatch(ours: &Recording, theirs: &Recording) -> Vec<String> {
     found
 }
 
-/// The difference of two arrays of one length, with the index where it starts. +0 and −0 count as equal: Python's `==` and numpy's
-/// do so too, and PyBullet's reports do not keep the sign of a zero.
+/// Difference of two arrays of equal length, with its first index. +0 and −0 are equal, as in numpy; PyBullet does not keep the sign of zero.
 fn difference(a: &[f64], b: &[f64]) -> Option<(Difference, usize)> {
     let mut found: Option<(Difference, usize)> = None;
     let far = FAR * a.iter().chain(b).fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -130,7 +129,7 @@ fn difference(a: &[f64], b: &[f64]) -> Option<(Difference, usize)> {
 
 /// Number of representable numbers from `a` to `b`.
 fn ulps(a: f64, b: f64) -> u64 {
-    // Maps floats to integers in the same order.
+    // Order-preserving map of floats to integers.
     let order = |x: f64| {
         let bits = x.to_bits().cast_signed();
         if bits < 0 { i64::MIN - bits } else { bits }
@@ -177,7 +176,7 @@ mod tests {
     #[test]
     fn near_zero_no_units_in_the_last_place_are_counted() {
         let mut other = recording();
-        // A hair beside zero is 4 billion billion units away, and says nothing; the largest angle is 0.6.
+        // 1e-12 is 4·10¹⁸ units from zero; the largest angle is 0.6.
         other.angles[0] = 1e-12;
         let angles = |other: &Recording| compare(&recording(), other).quantities[1].difference.clone().unwrap();
         assert_eq!((angles(&other).values, angles(&other).largest_ulp), (1, None));

@@ -1,4 +1,4 @@
-//! The planar engine judged by Bullet: the same experiment on both, and where they part.
+//! Comparison of the planar engine with Bullet on the same experiments.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::model::Mount;
 use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
 
-/// Experiments of the built-in set: presets by name.
+/// Presets of the built-in set.
 pub const ENGINE_SET: [&str; 10] = [
     "cantilever-dc",
     "cantilever-step",
@@ -22,42 +22,41 @@ pub const ENGINE_SET: [&str; 10] = [
     "mover-three-phase",
 ];
 
-/// Records of a comparison.
+/// Number of records of a run.
 const RECORDS: u64 = 1000;
-/// Nodes further apart than this have parted (cm).
+/// Distance above which the paths of a node have diverged (cm).
 pub const PARTED: f64 = 0.01;
-/// A step error above this share of a measure tells nothing: the engine has not converged on it.
+/// Step error, relative to the measure, above which an engine has not converged.
 const CONVERGED: f64 = 0.1;
-/// Heights and strides below this share of the nodes' largest travel are not judged: they are those of robots that stay where they are.
+/// Share of the nodes' largest travel below which heights and strides are not judged: the robot stays in place.
 const SMALL: f64 = 0.02;
-/// Share of the nodes' largest travel that heights and strides may differ by in any case. Bullet's robots creep: with steps of 2·10⁻⁵ to
-/// 2.5·10⁻⁶ s the inchworm's sum of displacements is 0.60, 0.60, 0.67 and 0.54 mm.
+/// Share of the nodes' largest travel by which heights and strides may always differ: resting robots creep on Bullet, depending on the step.
 const CREEP: f64 = 0.002;
 
 /// One measure on both engines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasurePair {
-    /// Its name, with the unit.
+    /// Name with the unit.
     pub name: String,
-    /// On Bullet.
+    /// Value on Bullet.
     pub bullet: f64,
-    /// On the planar engine.
+    /// Value on the planar engine.
     pub planar: f64,
-    /// How much each changes from a run with another step: twice the step, or half of it where that goes wrong; Bullet first.
+    /// Change with twice the step, or half of it if that fails; Bullet first.
     pub step_errors: [f64; 2],
-    /// How far they may differ.
+    /// Largest allowed difference.
     pub allowed: f64,
-    /// Whether they do not differ further.
+    /// True if the difference is allowed.
     pub passes: bool,
 }
 
-/// What a comparison says.
+/// Verdict of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum EngineVerdict {
     /// All judged measures agree.
     #[serde(rename = "agree")]
     Agree,
-    /// One does not.
+    /// A measure differs.
     #[serde(rename = "differ")]
     Differ,
     /// The measures cannot be judged.
@@ -65,12 +64,12 @@ pub enum EngineVerdict {
     None,
 }
 
-/// Where and when nodes are further apart than [`PARTED`] for the first time.
+/// First time and node with a distance above [`PARTED`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Parting {
-    /// When (s).
+    /// Time (s).
     pub time_s: f64,
-    /// Which node, from 0 at the left end.
+    /// Node, from 0 at the left end.
     pub node: usize,
 }
 
@@ -81,39 +80,38 @@ pub struct EngineReport {
     pub time_steps_s: [f64; 2],
     /// Wall times of both (s).
     pub wall_s: [f64; 2],
-    /// Largest distance of a node on one engine from the same on the other (mm).
+    /// Largest distance of a node between the engines (mm).
     pub largest_mm: f64,
-    /// Where they part first, if they do.
+    /// First divergence of the paths, if any.
     pub parting: Option<Parting>,
-    /// The measures that are judged.
+    /// Judged measures.
     pub measures: Vec<MeasurePair>,
-    /// Names of those that are too small to be judged.
+    /// Names of measures that are too small to be judged.
     pub too_small: Vec<String>,
-    /// What went wrong on Bullet and on the planar engine.
+    /// Warnings of Bullet and of the planar engine.
     pub warnings: [Vec<String>; 2],
-    /// What the comparison says.
+    /// Verdict.
     pub verdict: EngineVerdict,
-    /// Why there is no verdict.
+    /// Reason for a missing verdict.
     pub reason: Option<String>,
-    /// Whether all measures agree.
+    /// True if all judged measures agree.
     pub passes: bool,
 }
 
-/// How a measure is judged.
+/// Tolerance of a measure.
 #[derive(Debug, Clone, Copy)]
 struct Rule {
-    /// Share of the measure that it may differ by beyond the errors of both steps.
+    /// Allowed relative difference, in addition to the errors of both steps.
     share: f64,
-    /// Whether it is compared with the nodes' travel before it is judged.
+    /// True if the measure is judged only if it is large enough against the nodes' travel.
     travels: bool,
 }
 
-/// How a measure is judged: `None` for those that are not.
+/// Tolerance of a measure; `None` if it is not judged.
 ///
-/// Tips and resonances within 0.1 %, heights within 1 %. Strides and sums of displacements within 3 %, for Bullet's scatter with the step by more
-/// than twice the step tells: from 2·10⁻⁵ to 2.5·10⁻⁶ s those of the built-in set move by 2 to 3 %, and those of the planar engine's two friction
-/// models are 1 to 4 % apart. Periods are the same. Where a cantilever swings for ever its last height is not judged: Bullet's voltages come a
-/// step late, and the tip moves by 0.05 mm in one. Motion on the floor depends on every impact, so paths may part while these still agree.
+/// Tips and resonances 0.1 %, heights 1 %; strides and sums of displacements 3 %, because on Bullet they scatter with the step by 2 to 3 %. Periods
+/// are equal. The last height of a periodically driven cantilever is not judged: Bullet applies voltages one step late, in which the tip moves by
+/// 0.05 mm. Motion on the floor is sensitive to every impact, so paths may diverge while measures agree.
 fn rule(name: &str, swings: bool) -> Option<Rule> {
     let (share, travels) = match name {
         "tip_deflection_mm" if swings => return None,
@@ -126,7 +124,7 @@ fn rule(name: &str, swings: bool) -> Option<Rule> {
     Some(Rule { share, travels })
 }
 
-/// One engine's runs: the one that is judged, its wall time (s), and the measures of one with another step.
+/// Runs on one engine: the judged run with its wall time (s), and the measures with another step.
 struct Side {
     run: Run,
     wall: f64,
@@ -134,7 +132,7 @@ struct Side {
     other_step: Option<Vec<(String, f64)>>,
 }
 
-/// Height of the highest node in the records: what shows the shape of a robot that comes to rest.
+/// Height of the highest node in the records, a measure of the shape of a robot at rest.
 const HIGHEST: &str = "recorded_highest_point_mm";
 
 /// The measures of a run by name.
@@ -147,14 +145,14 @@ fn named(run: &Run, rests: bool) -> Vec<(String, f64)> {
     named
 }
 
-/// Runs an experiment on Bullet and on the planar engine, each with its own time step (s) and with twice that for its step's error.
+/// Runs an experiment on Bullet and on the planar engine, with their time `steps` (s) and with twice these for the step errors.
 ///
 /// # Errors
-/// [`EngineError`] if one of them fails.
+/// [`EngineError`] if a run fails.
 pub fn compare_engines(experiment: &Experiment, steps: [f64; 2]) -> Result<EngineReport, EngineError> {
     let duration = experiment.steps as f64 * experiment.time_step;
     let with = |engine: EngineKind, step: f64| {
-        // The same records for both: a whole number of steps between them, as near as the step allows.
+        // Equal record times on both engines: a whole number of steps between records.
         let every = (duration / RECORDS as f64 / step).round().max(1.0);
         let mut experiment = experiment.clone();
         (experiment.engine, experiment.time_step) = (engine, duration / RECORDS as f64 / every);
@@ -177,7 +175,7 @@ pub fn compare_engines(experiment: &Experiment, steps: [f64; 2]) -> Result<Engin
             run.trouble(&experiment).is_empty().then(|| named(&run, rests))
         };
         let h = experiment.time_step;
-        // Records as far apart as the step allow no longer one.
+        // The record interval limits the step.
         let longer = (with(engine, 2.0 * h).time_step > 1.5 * h).then_some(2.0 * h);
         let other_step = if warnings.is_empty() { longer.and_then(other).or_else(|| other(0.5 * h)) } else { None };
         Ok(Side { run, wall, warnings, other_step })
@@ -210,7 +208,7 @@ fn run_quietly(experiment: &Experiment, engine: &mut dyn Engine) -> Result<Run, 
     run(experiment, engine, |_| Control::Continue)
 }
 
-/// Compares the measures of both sides, Bullet first, beside the nodes' largest `travel` (mm); why there is no verdict.
+/// Compares the measures of both sides, Bullet first, given the nodes' largest `travel` (mm); returns the reason for a missing verdict.
 fn judge(report: &mut EngineReport, sides: [&Side; 2], travel: f64, swings: bool, rests: bool) -> Option<String> {
     let names = ["Bullet", "the planar engine"];
     for (side, name) in sides.iter().zip(names) {
@@ -232,7 +230,7 @@ fn judge(report: &mut EngineReport, sides: [&Side; 2], travel: f64, swings: bool
         let Some(rule) = rule(&name, swings) else { continue };
         let of = |list: &[(String, f64)]| list.iter().find(|(found, _)| *found == name).map(|(_, value)| *value);
         let (Some(planar), [Some(a), Some(b)]) = (of(&theirs), others.map(|other| of(other))) else {
-            return Some(format!("{name} cannot be had from all runs"));
+            return Some(format!("{name} is not a measure of all runs"));
         };
         if rule.travels && bullet.abs().max(planar.abs()) < SMALL * travel {
             report.too_small.push(name);
@@ -257,7 +255,7 @@ fn judge(report: &mut EngineReport, sides: [&Side; 2], travel: f64, swings: bool
     report.measures.is_empty().then(|| "no measure of this experiment is large enough to be judged".into())
 }
 
-/// Largest distance of a node from where it was in the first record (cm).
+/// Largest distance of a node from its position in the first record (cm).
 fn travel(recording: &Recording) -> f64 {
     let far = |record: usize, node: usize| {
         let (p, q) = (recording.node(record, node), recording.node(0, node));
@@ -268,8 +266,8 @@ fn travel(recording: &Recording) -> f64 {
         .fold(0.0, |most, (r, n)| far(r, n).max(most))
 }
 
-/// Largest distance of nodes (cm), and where it first exceeds [`PARTED`]. Records are matched by number; their times differ by a step,
-/// for a state is recorded before its step.
+/// Largest distance of a node between two recordings (cm), and where it first exceeds [`PARTED`]. Records are matched by index; their times differ
+/// by a step.
 fn distance(a: &Recording, b: &Recording) -> (f64, Option<Parting>) {
     let (mut largest, mut parting) = (0.0_f64, None);
     for record in 0..a.len().min(b.len()) {

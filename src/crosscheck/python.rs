@@ -1,4 +1,4 @@
-//! Running the reference: PyBullet through a script of this program, or the authors' own classes.
+//! Runs of the reference: PyBullet by a script of this program, or the authors' own classes.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::recording::{Recording, RecordingError, npz};
 const REFERENCE_SCRIPT: &str = include_str!("reference.py");
 const AUTHORS_SCRIPT: &str = include_str!("authors.py");
 
-/// A cross-check that could not be made.
+/// A failure of a cross-check.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CrosscheckError {
@@ -38,7 +38,7 @@ pub enum CrosscheckError {
         /// The last line it wrote.
         stderr: String,
     },
-    /// What came back is not a recording.
+    /// The script's output is not a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The authors' package has no class for this experiment.
@@ -49,7 +49,7 @@ pub enum CrosscheckError {
     Temporary(#[from] std::io::Error),
 }
 
-/// What the reference ran on.
+/// Versions that the reference ran with.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Versions {
     /// PyBullet's version.
@@ -60,7 +60,7 @@ pub struct Versions {
     pub python: String,
 }
 
-/// Runs an experiment on PyBullet, through its public calls.
+/// Runs an experiment on PyBullet through its public API.
 ///
 /// # Errors
 /// [`CrosscheckError`] if Python, PyBullet or numpy is missing, or the script fails.
@@ -68,12 +68,12 @@ pub fn run_pybullet(experiment: &Experiment, python: &Path) -> Result<(Recording
     run_script(REFERENCE_SCRIPT, experiment.spec(), python)
 }
 
-/// Runs an experiment on the authors' own classes, from a checkout of their package in `sfers`.
+/// Runs an experiment with the authors' classes, from a checkout of their package in the folder `sfers`.
 ///
 /// # Errors
-/// [`CrosscheckError::NoClass`] if none of their classes does this experiment, and as [`run_pybullet`].
+/// [`CrosscheckError::NoClass`] if none of their classes runs this experiment, and as [`run_pybullet`].
 pub fn run_authors(experiment: &Experiment, python: &Path, sfers: &Path) -> Result<(Recording, Versions), CrosscheckError> {
-    let run = authors_run(experiment).map_err(CrosscheckError::NoClass)?;
+    let run = authors_run(experiment)?;
     let mut spec = json!({
         "class": run.class, "mode": run.mode, "arg": run.arg, "parameter": run.parameter, "settings": run.settings,
     });
@@ -98,8 +98,7 @@ fn run_script(script: &str, mut spec: Value, python: &Path) -> Result<(Recording
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         // PyBullet says when it was built, whatever happens.
-        let last =
-            text.lines().rfind(|line| !line.trim().is_empty() && !line.contains("build time")).unwrap_or("it said nothing");
+        let last = text.lines().rfind(|line| !line.trim().is_empty() && !line.contains("build time")).unwrap_or("no message");
         return Err(failed(last.to_owned()));
     }
     if let Some(Err(error)) = written {
@@ -107,30 +106,30 @@ fn run_script(script: &str, mut spec: Value, python: &Path) -> Result<(Recording
     }
     let text = String::from_utf8_lossy(&output.stdout);
     let versions = text.lines().last().and_then(|line| serde_json::from_str(line).ok());
-    let versions = versions.ok_or_else(|| failed("it did not say its versions".into()))?;
+    let versions = versions.ok_or_else(|| failed("its output lacks the versions".into()))?;
     Ok((npz::read_file(&out)?, versions))
 }
 
-/// How the authors' package runs an experiment.
+/// Call of the authors' package that runs an experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AuthorsRun {
     /// Class of `sfers.robot_simulation.inchworm_envs`.
     pub class: &'static str,
-    /// dc, ac, step, drive or dcscan: which method is called.
+    /// Method: dc, ac, step, drive or dcscan.
     pub mode: &'static str,
-    /// Its argument.
+    /// Argument of the method.
     pub arg: Value,
     /// Name of the parameter set.
     pub parameter: &'static str,
-    /// Attributes set on the object before.
+    /// Attributes set on the object before the call.
     pub settings: Value,
 }
 
-/// Finds the class, method and settings that do this experiment.
+/// Class, method and settings of the authors' package that run this experiment.
 ///
 /// # Errors
-/// Why no class does it.
-pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, String> {
+/// [`CrosscheckError::NoClass`] with the reason if no class runs it.
+pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, CrosscheckError> {
     let robot = &experiment.robot;
     let m = &robot.material;
     let same_but_length = |set: Material| Material { actuator_length: m.actuator_length, ..set } == *m;
@@ -139,10 +138,10 @@ pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, String> {
     } else if same_but_length(Material::PARAMETER_4) {
         "trimorph parameter 4"
     } else {
-        return Err("the material is neither parameter set 2 nor 4".into());
+        return Err(no_class("the material is neither parameter set 2 nor 4"));
     };
     if robot.positive_gain != 1.0 {
-        return Err("positive_gain is not 1".into());
+        return Err(no_class("positive_gain is not 1"));
     }
     let mut settings = json!({
         "N": robot.actuators, "m": robot.motors_per_actuator, "timeStep": experiment.time_step, "simCycles": experiment.steps,
@@ -150,7 +149,7 @@ pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, String> {
         "thickness": robot.collision_thickness,
     });
     let (class, mode, arg) = match robot.mount {
-        Mount::Free => return Err("the robot is free".into()),
+        Mount::Free => return Err(no_class("the robot is free")),
         Mount::Clamped => cantilever(experiment)?,
         Mount::Ground => {
             let f = &robot.friction;
@@ -171,13 +170,18 @@ pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, String> {
     Ok(AuthorsRun { class, mode, arg, parameter, settings })
 }
 
+/// Class, method and argument.
 type Call = (&'static str, &'static str, Value);
 
-fn cantilever(experiment: &Experiment) -> Result<Call, String> {
+fn no_class(reason: impl Into<String>) -> CrosscheckError {
+    CrosscheckError::NoClass(reason.into())
+}
+
+fn cantilever(experiment: &Experiment) -> Result<Call, CrosscheckError> {
     let robot = &experiment.robot;
     let class = "SingleActuatorCantilever";
     if robot.actuators != 1 {
-        return Err("their cantilever has one actuator".into());
+        return Err(no_class("their cantilever has one actuator"));
     }
     match &experiment.drive.waveform {
         Waveform::Dc(voltages) => Ok((class, "dc", json!([voltages]))),
@@ -187,11 +191,11 @@ fn cantilever(experiment: &Experiment) -> Result<Call, String> {
         Waveform::Step { voltages, at } if *voltages == [-1500.0] && *at == 2.0 * experiment.time_step => {
             Ok((class, "step", Value::Null))
         }
-        _ => Err("their cantilever knows dc, sine to -1500 V and step to -1500 V".into()),
+        _ => Err(no_class("their cantilever has dc, sine to -1500 V and step to -1500 V only")),
     }
 }
 
-fn crawler(experiment: &Experiment) -> Result<Call, String> {
+fn crawler(experiment: &Experiment) -> Result<Call, CrosscheckError> {
     let both = experiment.robot.friction.film == Film::BothEnds;
     let (class, mode, arg, needs_both) = match &experiment.drive.waveform {
         Waveform::Dc(voltages) => ("InchwormDCResponseVoltageScan", "dcscan", json!([voltages]), false),
@@ -209,15 +213,15 @@ fn crawler(experiment: &Experiment) -> Result<Call, String> {
                 "jumper-pulse" => ("EfficientJumperActuatorLengthScan", false),
                 "mover" => ("EfficientMover", true),
                 "mover-delay" => ("EfficientMoverDelayScan", true),
-                other => return Err(format!("gait {other} is from a notebook")),
+                other => return Err(no_class(format!("gait {other} is from a notebook"))),
             };
             (class, "drive", json!([parameter]), needs_both)
         }
-        _ => return Err("their robots know gaits and constant voltages".into()),
+        _ => return Err(no_class("their robots have gaits and constant voltages only")),
     };
     if both != needs_both || experiment.robot.friction.film == Film::None {
         let place = if needs_both { "both ends" } else { "the right end" };
-        return Err(format!("class {class} has its film under {place}"));
+        return Err(no_class(format!("class {class} has its film under {place}")));
     }
     Ok((class, mode, arg))
 }

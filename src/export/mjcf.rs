@@ -1,4 +1,4 @@
-//! MJCF: the whole model for MuJoCo.
+//! MJCF export: the complete model for MuJoCo.
 
 use std::fmt::Write;
 
@@ -11,9 +11,8 @@ const LARGEST_FRICTION: f64 = 10.0;
 
 /// The robot of an experiment as MJCF: chain, springs, dampers, floor, and one actuator per joint.
 ///
-/// The actuators `joint_1` and so on take the target angle θ_V = −β V/m (rad) and add k·θ_V to the joint's spring −k·θ and damper −k·η·θ̇, which
-/// together is eq. 1. Friction coefficients are the products that Bullet forms of link and floor, where MuJoCo would take the larger one;
-/// links do not touch one another.
+/// Actuator `joint_i` takes the target angle θ_V = −β V/m (rad) and adds k·θ_V to the joint's spring −k·θ and damper −k·η·θ̇, which together is
+/// eq. 1. Friction coefficients are the products of link and floor, as in Bullet; MuJoCo would take the larger one. Links do not collide.
 pub fn mjcf(experiment: &Experiment, command: &str) -> String {
     let robot = &experiment.robot;
     let joint = robot.joint();

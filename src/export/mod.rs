@@ -1,4 +1,4 @@
-//! The robots for other simulators: URDF out and in, MJCF, and what URDF cannot say as JSON beside it.
+//! Robots for other simulators: URDF export and import, MJCF, and a JSON sidecar of URDF.
 //!
 //! All numbers are in the program's units, CGS: cm, g, s, dyn. A simulator that takes them as m, kg, s computes the same motion as long as
 //! gravity is given in cm/s² too; forces and energies then come out in dyn and erg.
@@ -15,18 +15,18 @@ pub use urdf_in::{UrdfError, bodies};
 
 use crate::model::{Robot, Segment};
 
-/// A body as both formats need it.
+/// A body of a URDF or MJCF file.
 struct Placed {
     /// `link_0` at the left end.
     name: String,
     segment: Segment,
-    /// From the parent's frame to this one's along x (cm). The base's frame stands in its centre, a link's in its joint.
+    /// Distance from the parent's frame along x (cm). The frame of the base is in its centre, that of a link in its joint.
     frame: f64,
-    /// From the frame to the centre of mass along x (cm).
+    /// Distance from the frame to the centre of mass along x (cm).
     centre: f64,
     /// Full extents of the box (cm).
     size: [f64; 3],
-    /// About the centre of mass (g·cm²): that of a box of even density, m (b² + c²)/12.
+    /// Inertia about the centre of mass (g·cm²): that of a homogeneous box.
     inertia: [f64; 3],
 }
 
@@ -54,12 +54,12 @@ fn placed(robot: &Robot) -> Vec<Placed> {
         .collect()
 }
 
-/// Inertia (g·cm²) about the axes of a box of even density.
+/// Principal inertias m (b² + c²)/12 of a homogeneous box (g·cm²).
 fn box_inertia(mass: f64, [x, y, z]: [f64; 3]) -> [f64; 3] {
     [mass / 12.0 * (y * y + z * z), mass / 12.0 * (x * x + z * z), mass / 12.0 * (x * x + y * y)]
 }
 
-/// Text for an XML comment, in which two hyphens may not follow one another.
+/// Text for an XML comment, which must not contain two successive hyphens.
 fn comment(text: &str) -> String {
     crate::view::escape(&text.replace("--", "- -"))
 }

@@ -1,4 +1,4 @@
-//! What URDF cannot say.
+//! The JSON sidecar of a URDF.
 
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ pub fn sidecar(experiment: &Experiment, command: &str) -> Value {
         "damping_time_s": joint.damping_time,
         "joint_damping_dyn_cm_s_per_rad": joint.stiffness * joint.damping_time,
         "positive_gain": robot.positive_gain,
-        "mount": match robot.mount { Mount::Ground => "ground", Mount::Clamped => "clamped", Mount::Free => "free" },
+        "mount": robot.mount.name(),
         "gravity_cm_s2": robot.material.gravity,
         "floor": (robot.mount == Mount::Ground).then(|| json!({"height_cm": -0.5 * robot.collision_thickness, "friction": robot.friction.ground})),
         "time_step_s": experiment.time_step,

@@ -1,4 +1,4 @@
-//! URDF out.
+//! URDF export.
 
 use std::fmt::Write;
 
@@ -6,11 +6,11 @@ use super::{Placed, comment, placed};
 use crate::experiment::Experiment;
 use crate::model::Mount;
 
-/// The robot of an experiment as URDF. `command` is written into a comment, so that the file tells how it was made.
+/// The robot of an experiment as URDF, with `command` in a comment.
 ///
 /// Links with explicit inertias, one continuous joint about +y between neighbours (no limits), Bullet's `<contact>` for friction, and k·η as
-/// the joints' damping. URDF has no springs and no drives: those stand in the [`sidecar`](super::sidecar). A simulator that applies the
-/// torque law of eq. 1 itself must set the joints' damping to zero, or it would damp twice.
+/// the joints' damping. Springs and drives, which URDF lacks, are in the [`sidecar`](super::sidecar). A simulator that applies the torque law of
+/// eq. 1 must set the joints' damping to zero, or it would damp twice.
 pub fn urdf(experiment: &Experiment, command: &str) -> String {
     let robot = &experiment.robot;
     let joint = robot.joint();

@@ -1,4 +1,4 @@
-//! URDF in: a chain of boxes with hinges about +y.
+//! URDF import: a chain of boxes with hinges about +y.
 
 use std::collections::HashMap;
 
@@ -30,20 +30,20 @@ fn fault(element: String, reason: impl Into<String>) -> UrdfError {
     UrdfError::Element { element, reason: reason.into() }
 }
 
-/// Relative error up to which two lengths or inertias count as the same: far above rounding, far below any difference that is meant.
+/// Relative difference up to which lengths or inertias are equal, well above rounding.
 const SAME: f64 = 1e-9;
 
 fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME * a.abs().max(b.abs())
 }
 
-/// Reads the bodies of a chain, from the base on, for a robot whose width and thickness they must have.
+/// Parses the bodies of a chain from the base on, which must have the width and thickness of `robot`.
 ///
-/// urdf-rs invents an inertia, a friction and limits where the file has none, and drops `<contact>`; so those are looked up in the XML
-/// itself. Ignored: `<visual>`, `<dynamics>` (damping is the experiment's), names.
+/// urdf-rs invents missing inertias and limits and drops `<contact>`, so these are read from the XML. `<visual>`, `<dynamics>` (damping is the
+/// experiment's) and names are ignored.
 ///
 /// # Errors
-/// [`UrdfError`] names the element.
+/// [`UrdfError`] with the element, if the file is not such a chain.
 pub fn bodies(text: &str, robot: &Robot) -> Result<Vec<Segment>, UrdfError> {
     let document = Document::parse(text).map_err(|error| UrdfError::Syntax(error.to_string()))?;
     let frictions = check_xml(&document)?;
@@ -53,7 +53,7 @@ pub fn bodies(text: &str, robot: &Robot) -> Result<Vec<Segment>, UrdfError> {
     for (i, link) in links.iter().enumerate() {
         let length = body(link, i == 0, robot)?;
         if let Some(joint) = i.checked_sub(1).map(|i| joints[i]) {
-            // The base's frame stands in its centre, a link's at its near end.
+            // The frame of the base is in its centre, that of a link at its left end.
             let before = if i == 1 { 0.5 * segments[0].length } else { segments[i - 1].length };
             hinge(joint, before)?;
         }
@@ -63,7 +63,7 @@ pub fn bodies(text: &str, robot: &Robot) -> Result<Vec<Segment>, UrdfError> {
     Ok(segments)
 }
 
-/// What urdf-rs would pass over. Returns each link's friction.
+/// Checks the elements that urdf-rs ignores; returns the friction of each link.
 fn check_xml(document: &Document) -> Result<HashMap<String, f64>, UrdfError> {
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
@@ -89,7 +89,7 @@ fn check_xml(document: &Document) -> Result<HashMap<String, f64>, UrdfError> {
         let friction =
             friction.ok_or_else(|| fault(element.clone(), format!("its friction {value:?} is not a number of zero or more")))?;
         if frictions.insert(name.to_owned(), friction).is_some() {
-            return Err(fault(element, "stands there twice"));
+            return Err(fault(element, "is defined twice"));
         }
     }
     for node in root.children().filter(|node| node.has_tag_name("joint")) {
@@ -120,13 +120,16 @@ fn chain<'a>(links: &'a [Link], joints: &'a [Joint]) -> Result<(Vec<&'a Link>, V
         if let Some(other) = after.insert(&joint.parent.link, joint) {
             return Err(fault(
                 element(),
-                format!("branches off link {:?}, from which joint {:?} goes already", joint.parent.link, other.name),
+                format!(
+                    "is the second joint on link {:?}, after joint {:?}: chains must not branch",
+                    joint.parent.link, other.name
+                ),
             ));
         }
         if let Some(other) = is_child.insert(&joint.child.link, joint) {
             return Err(fault(
                 element(),
-                format!("closes a loop: link {:?} hangs on joint {:?} already", joint.child.link, other.name),
+                format!("closes a loop: link {:?} already hangs on joint {:?}", joint.child.link, other.name),
             ));
         }
     }
@@ -165,7 +168,7 @@ fn hinge(joint: &Joint, before: f64) -> Result<(), UrdfError> {
     Ok(())
 }
 
-/// Checks one link and returns its length.
+/// Checks one link; returns its length (cm).
 fn body(link: &Link, base: bool, robot: &Robot) -> Result<f64, UrdfError> {
     let bad = |reason: String| Err(fault(format!("link {:?}", link.name), reason));
     let [collision] = &link.collision[..] else { return bad("must have one <collision>".into()) };

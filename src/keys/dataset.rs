@@ -1,4 +1,4 @@
-//! Keys of descriptions of measured data.
+//! Keys of dataset files.
 
 use super::Default::{Else, Is, Needed};
 use super::Range::{Any, Positive};
@@ -8,18 +8,15 @@ use crate::recording::definitions;
 
 pub(super) static FILE: File = File {
     name: "dataset",
-    about: "Measured data: what robot it was, which points were tracked, and a file per run or single numbers. `sfers diagnose` reads it.",
+    about: "Measured data: the robot, the tracked points, and a file per run or single numbers. `sfers diagnose` reads it.",
     sections: &[DATASET, experiment::MATERIAL, experiment::ROBOT, experiment::FRICTION, MARKERS, NOISE, RUN, OBSERVATION],
 };
 
 pub(super) const DATASET: Section = Section {
     name: "dataset",
     heading: "[dataset]",
-    about: "What the data are called.",
-    keys: &[
-        key("name", Text, Else("the file's name"), "name of the data"),
-        key("about", Text, Is("\"\""), "a few words on them"),
-    ],
+    about: "Name of the data.",
+    keys: &[key("name", Text, Else("the file's name"), "name of the data"), key("about", Text, Is("\"\""), "short description")],
 };
 
 const MARKERS: Section = Section {
@@ -37,14 +34,14 @@ const NOISE: Section = Section {
 };
 
 pub(super) const DEFAULT_NOISE: Key =
-    key("default_mm", Number(Positive), Else("estimated"), "of all markers that have none of their own");
+    key("default_mm", Number(Positive), Else("estimated"), "of all markers without a value of their own");
 
 pub(super) const RUN: Section = Section {
     name: "run",
     heading: "[[run]]",
     about: "One run as measured.",
     keys: &[
-        key("id", Text, Needed, "its name; no other run has it"),
+        key("id", Text, Needed, "unique name"),
         key(
             "file",
             Path,
@@ -65,12 +62,12 @@ pub(super) const OBSERVATION: Section = Section {
     heading: "[[observation]]",
     about: "A single measured number instead of a time series.",
     keys: &[
-        key("measure", Name("measure", definitions::names), Needed, "which measure it is"),
+        key("measure", Name("measure", definitions::names), Needed, "name of the measure"),
         key("value", Number(Any), Needed, "its value, in the measure's unit"),
         key("sigma", Number(Positive), Needed, "one standard deviation"),
-        key("drive", Other("a table"), Needed, "what it was measured under: the keys of [drive] in an experiment file"),
-        key("robot", Other("a table"), Else("as above"), "what replaces keys of [robot]"),
-        key("material", Other("a table"), Else("as above"), "what replaces keys of [material]"),
+        key("drive", Other("a table"), Needed, "the drive of the measurement: the keys of [drive] in an experiment file"),
+        key("robot", Other("a table"), Else("as above"), "replacements of keys of [robot]"),
+        key("material", Other("a table"), Else("as above"), "replacements of keys of [material]"),
         key(
             "simulation",
             Other("a table"),

@@ -10,7 +10,7 @@ use crate::recording::definitions;
 
 pub(super) static FILE: File = File {
     name: "experiment",
-    about: "One robot, what drives it, and how long it is simulated. `sfers run`, `animate`, `urdf`, `mjcf` and `crosscheck` read it.",
+    about: "One robot, its drive and its simulation. `sfers run`, `animate`, `urdf`, `mjcf` and `crosscheck` read it.",
     sections: &[MATERIAL, ROBOT, FRICTION, DRIVE, PHASES, SIMULATION, EFFECT],
 };
 
@@ -106,7 +106,7 @@ pub(super) const ROBOT: Section = Section {
             "positive_gain",
             Number(Positive),
             Is("1.0"),
-            "factor on positive voltages before the torque law; 1.733 for voltages as applied to the published robot",
+            "factor on positive voltages before the torque law; 1.733 for the voltages applied to the published robot",
         ),
         key("friction", Other("a table"), Else("see below"), "coefficients of friction: [robot.friction]"),
     ],
@@ -212,15 +212,15 @@ pub(super) const PHASES: Section = Section {
 pub(super) const SIMULATION: Section = Section {
     name: "simulation",
     heading: "[simulation]",
-    about: "What steps the robot, in which steps, for how long.",
+    about: "Engine, time steps, duration and records.",
     keys: &[
         key("engine", Word(&["bullet", "planar"]), Is("\"bullet\""), "bullet: bit for bit the reference; planar: the fast one. In sweeps the default is planar"),
         key("start", Word(&["flat", "settled"]), Is("\"flat\""), "flat and at rest; or in equilibrium with gravity, floor and first voltages (planar engine)"),
         key("friction", Word(&["coulomb", "convex"]), Is("\"coulomb\""), "law of friction: coulomb is solved in every step; convex, a relaxation, lifts sliding contacts by friction times speed times time step").with("engine = \"planar\""),
-        key("numerical_damping_per_s", Number(NotNegative), Else("50"), "weight of a step's end over that of its start, per time step: damps what alternates from step to step; less is more exact where nothing touches").with("engine = \"planar\""),
-        key("time_step_s", Other("a number from 1e-12 to 1000, or \"auto\" on the planar engine"), Needed, "time step; \"auto\": steps adapt to the motion, finer and finer until the result stays to step_error"),
+        key("numerical_damping_per_s", Number(NotNegative), Else("50"), "weight of a step's end over that of its start, per time step: damps oscillations between steps; less is more accurate without contact").with("engine = \"planar\""),
+        key("time_step_s", Other("a number from 1e-12 to 1000, or \"auto\" on the planar engine"), Needed, "time step; \"auto\": adaptive steps, with tolerances refined until the result changes by less than step_error"),
         key("step_error", Number(Inside(0.0, 1.0)), Is("0.001"), "relative change of the result that a ten times tighter tolerance may make").with("time_step_s = \"auto\""),
-        key("step_measure", Name("measure", definitions::names), Else("the path of all nodes"), "name of the measure that decides the tolerance").with("time_step_s = \"auto\""),
+        key("step_measure", Name("measure", definitions::names), Else("the path of all nodes"), "name of the measure that sets the tolerance").with("time_step_s = \"auto\""),
         key("steps", Whole(Positive), Else("duration_s is needed"), "number of steps"),
         key("duration_s", Number(Positive), Else("steps is needed"), "length of the run"),
         key("record_every_steps", Whole(Positive), Else("about a thousand records"), "steps from one record to the next; the first and last step are always recorded"),
@@ -229,7 +229,7 @@ pub(super) const SIMULATION: Section = Section {
     ],
 };
 
-/// Its other keys are the parameters of the effects.
+/// The other keys are the parameters of the effects.
 pub(super) const EFFECT: Section = Section {
     name: "effect",
     heading: "[[effect]]",

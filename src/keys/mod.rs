@@ -1,7 +1,6 @@
-//! The keys of experiment, sweep and dataset files, as tables: what `sfers help keys`, docs/keys.md and the manual page show.
+//! Tables of the keys of experiment, sweep and dataset files, for `sfers help keys`, docs/keys.md and the manual page.
 //!
-//! The tables are held to the program by tests: their keys are those that the parser accepts, their defaults and choices those that the
-//! program has, their ranges those that it refuses to leave.
+//! Tests compare keys, defaults, choices and ranges of the tables with those that the program accepts.
 
 mod dataset;
 mod experiment;
@@ -16,39 +15,39 @@ pub use render::{facts, json, markdown, text};
 /// A kind of file.
 #[derive(Debug)]
 pub struct File {
-    /// Its name: experiment, sweep or dataset.
+    /// Name: experiment, sweep or dataset.
     pub name: &'static str,
-    /// What it is for.
+    /// Purpose.
     pub about: &'static str,
-    /// Its tables, in the order of a file.
+    /// Tables, in the order of a file.
     pub sections: &'static [Section],
 }
 
 /// A table of a file.
 #[derive(Debug)]
 pub struct Section {
-    /// Its name with dots; empty for keys outside of tables.
+    /// Name with dots; empty for keys outside of tables.
     pub name: &'static str,
-    /// How it is written.
+    /// Heading as written in a file.
     pub heading: &'static str,
-    /// What it describes.
+    /// Contents.
     pub about: &'static str,
-    /// Its keys.
+    /// Keys.
     pub keys: &'static [Key],
 }
 
 /// A key.
 #[derive(Debug)]
 pub struct Key {
-    /// Its name, with the unit.
+    /// Name with the unit.
     pub name: &'static str,
-    /// What kind of value it takes.
+    /// Kind of value.
     pub value: Value,
-    /// The value where the file gives none.
+    /// Value of an absent key.
     pub default: Default,
-    /// What it goes with: other keys decide whether it may stand there. Empty: it always may.
+    /// Values of other keys that it requires; empty if none.
     pub with: &'static str,
-    /// What it means.
+    /// Meaning.
     pub about: &'static str,
 }
 
@@ -61,21 +60,21 @@ pub enum Value {
     Whole(Range),
     /// One of some words.
     Word(&'static [&'static str]),
-    /// A name of such a thing, out of a table of the program.
+    /// A name from a table of the program: the kind of thing, and the names.
     Name(&'static str, fn() -> Vec<&'static str>),
-    /// A list of such names.
+    /// A list of names from a table of the program.
     Names(&'static str, fn() -> Vec<&'static str>),
     /// Any text.
     Text,
-    /// The name of a file, relative to the file that names it.
+    /// The path of a file, relative to the file with the key.
     Path,
     /// A list of numbers.
     Numbers,
-    /// Something else, in words.
+    /// Another kind, in words.
     Other(&'static str),
 }
 
-/// Ranges of numbers. Infinity and "not a number" lie in none.
+/// Ranges of numbers, without infinity and NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
     /// Any.
@@ -84,53 +83,35 @@ pub enum Range {
     Positive,
     /// 0 or more.
     NotNegative,
-    /// Both ends belong to it.
+    /// A closed interval.
     Between(f64, f64),
-    /// Neither end belongs to it.
+    /// An open interval.
     Inside(f64, f64),
 }
 
-/// What holds where a file does not give a key.
+/// Value of an absent key.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Default {
-    /// It must be given.
+    /// The key is required.
     Needed,
     /// A value, as TOML.
     Is(&'static str),
     /// The value of the material's preset: `parameter-2` and `parameter-4`.
     OfPreset(&'static str, &'static str),
-    /// What happens, in words.
+    /// The behaviour, in words.
     Else(&'static str),
 }
 
 /// All files.
 pub static FILES: [&File; 3] = [&experiment::FILE, &sweep::FILE, &dataset::FILE];
 
-/// Units by the ends of names, longest first.
-const UNITS: [(&str, &str); 14] = [
-    ("_mm_per_s", "mm/s"),
-    ("_per_s", "1/s"),
-    ("_pm_per_v", "pm/V"),
-    ("_g_cm3", "g/cm³"),
-    ("_mm_s", "mm/s"),
-    ("_m_s2", "m/s²"),
-    ("_gpa", "GPa"),
-    ("_deg", "°"),
-    ("_um", "µm"),
-    ("_kv_mm", "kV/mm"),
-    ("_mm", "mm"),
-    ("_hz", "Hz"),
-    ("_s", "s"),
-    ("_v", "V"),
-];
-
-/// The unit that stands in a name; empty for plain numbers.
+/// The unit in a name; empty for dimensionless quantities.
 pub fn unit(name: &str) -> &'static str {
-    UNITS.iter().find(|(end, _)| name.ends_with(end)).map_or("", |(_, unit)| unit)
+    crate::words::split_unit(name).map_or("", |(_, unit)| unit)
 }
 
 impl Section {
-    /// A key's name with its table's.
+    /// The name of a key with its table's.
     pub fn dotted(&self, key: &Key) -> String {
         if self.name.is_empty() { key.name.into() } else { format!("{}.{}", self.name, key.name) }
     }
@@ -141,7 +122,7 @@ const fn key(name: &'static str, value: Value, default: Default, about: &'static
 }
 
 impl Key {
-    /// The same key, which goes with others only.
+    /// The key with values of other keys that it requires.
     const fn with(self, with: &'static str) -> Self {
         Self { with, ..self }
     }

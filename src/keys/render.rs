@@ -1,4 +1,4 @@
-//! The tables as plain text, as Markdown and as JSON.
+//! The tables of keys as plain text, Markdown and JSON.
 
 use serde_json::json;
 
@@ -7,7 +7,7 @@ use crate::effects::EFFECTS;
 use crate::words::number;
 
 impl Range {
-    /// In words, for numbers that may have fractions or not.
+    /// The range in words, for whole or real numbers.
     pub fn words(self, whole: bool) -> String {
         match self {
             Self::Any => String::new(),
@@ -21,7 +21,7 @@ impl Range {
 }
 
 impl Value {
-    /// What kind of value it is.
+    /// The kind of value in words.
     pub fn kind(self) -> String {
         match self {
             Self::Number(_) => "number".into(),
@@ -35,7 +35,7 @@ impl Value {
         }
     }
 
-    /// The words that may stand there; empty if any may.
+    /// The values allowed; empty if not limited to a list.
     pub fn choices(self) -> Vec<&'static str> {
         match self {
             Self::Word(choices) => choices.to_vec(),
@@ -44,7 +44,7 @@ impl Value {
         }
     }
 
-    /// The range of a number; empty if there is none.
+    /// The range of a number in words; empty if there is none.
     pub fn range(self) -> String {
         match self {
             Self::Number(range) => range.words(false),
@@ -53,10 +53,10 @@ impl Value {
         }
     }
 
-    /// Choices or range in a few words.
+    /// Choices or range in words.
     fn allowed(self) -> String {
         match self {
-            // Named elsewhere, and many.
+            // Long lists that are documented elsewhere.
             Self::Name(what, _) | Self::Names(what, _) if what != "gait" => String::new(),
             _ if !self.choices().is_empty() => self.choices().join(", "),
             _ => self.range(),
@@ -65,7 +65,7 @@ impl Value {
 }
 
 impl Default {
-    /// In words.
+    /// The default in words.
     pub fn words(self) -> String {
         match self {
             Self::Needed => "needed".into(),
@@ -77,12 +77,12 @@ impl Default {
     }
 }
 
-/// Whether a user who asks for `topic` means this key: a table, a part of its dotted name, or the name itself.
+/// True if `topic` is part of the key's dotted name, or absent.
 fn matches(section: &Section, key: &Key, topic: Option<&str>) -> bool {
     topic.is_none_or(|topic| section.dotted(key).contains(topic))
 }
 
-/// The keys as plain text, of one topic or all; empty if there is none of that topic.
+/// The keys of a topic, or all, as plain text; empty if no key matches.
 pub fn text(topic: Option<&str>) -> String {
     let mut text = String::new();
     for file in FILES {
@@ -90,7 +90,7 @@ pub fn text(topic: Option<&str>) -> String {
             let keys: Vec<_> = section.keys.iter().filter(|key| matches(section, key, topic)).collect();
             (topic.is_none() || topic == Some(section.name) || !keys.is_empty()).then_some(keys)
         };
-        // What a file has in common with an experiment is there once, unless nothing else is wanted.
+        // Tables shared with experiment files are listed once.
         let own = |section: &&Section| file.name == "experiment" || !is_shared(section);
         let sections: Vec<_> = file.sections.iter().filter(own).filter_map(|section| Some((section, shown(section)?))).collect();
         if sections.is_empty() {
@@ -111,12 +111,12 @@ pub fn text(topic: Option<&str>) -> String {
     text
 }
 
-/// Whether a table is one of experiment files.
+/// True if a table of another file is that of experiment files.
 fn is_shared(section: &Section) -> bool {
     ["material", "robot", "robot.friction"].contains(&section.name)
 }
 
-/// Kind, unit, range or choices and default of a key, and what it goes with.
+/// Kind, unit, range or choices, default and requirements of a key, in words.
 pub fn facts(key: &Key) -> String {
     let unit = Some(unit(key.name)).filter(|unit| !unit.is_empty()).map_or_else(String::new, |unit| format!(" ({unit})"));
     let mut facts = vec![format!("{}{unit}", key.value.kind())];
@@ -134,7 +134,7 @@ fn entry(key: &Key) -> String {
     format!("  {}\n{}{}", key.name, wrapped(key.about, 6), wrapped(&facts(key), 6))
 }
 
-/// A paragraph with an indent, in lines of at most 100 characters.
+/// An indented paragraph in lines of at most 100 characters.
 pub(crate) fn wrapped(text: &str, indent: usize) -> String {
     let mut out = String::new();
     let mut line = String::new();
@@ -193,7 +193,7 @@ fn row(key: &Key) -> String {
     format!("| `{}` | {} | {} | {default} | {allowed} | {}{with} |\n", key.name, key.value.kind(), unit(key.name), key.about)
 }
 
-/// The parameters of the effects, which are keys of their tables.
+/// Table of the effects' parameters, keys of `[[effect]]`.
 fn effect_keys() -> String {
     let mut text = String::from("\n| `id` | key | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |\n");
     for effect in EFFECTS {

@@ -14,11 +14,11 @@ pub(super) static FILE: File = File {
 pub(super) const TOP: Section = Section {
     name: "",
     heading: "above all tables",
-    about: "What is run and what is kept of it.",
+    about: "Experiment, measures and varied keys.",
     keys: &[
         key("experiment", Text, Needed, "the experiment file, relative to the sweep file, or \"preset:NAME\""),
         key("measures", Names("measure", definitions::names), Needed, "names of the measures, one column each"),
-        key("vary", Other("a table"), Needed, "what is varied: [vary]"),
+        key("vary", Other("a table"), Needed, "varied keys: [vary]"),
     ],
 };
 

@@ -16,6 +16,17 @@ pub enum Mount {
     Free,
 }
 
+impl Mount {
+    /// Name in experiment files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ground => "ground",
+            Self::Clamped => "clamped",
+            Self::Free => "free",
+        }
+    }
+}
+
 /// Where films of high friction are glued under the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Film {

@@ -1,7 +1,7 @@
-//! Recordings as CSV, with the unit in every column's name.
+//! CSV files of recordings, with units in the column names.
 
 use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
@@ -9,10 +9,10 @@ use super::{GroundMeta, MAX_VALUES, Meta, Recording, RecordingError, check_value
 use crate::files;
 use crate::model::units::{cm_from_mm, mm_from_cm};
 
-/// Writes a recording: time, then angle, rate, torque and voltage of each joint, then x and z of each node, then the velocity of
-/// each node itself, where it is known. y is left out.
+/// Writes a recording: time; angles, rates, torques and voltages of the joints; x and z of the nodes; velocities of the nodes, if known. y is
+/// omitted.
 ///
-/// Numbers are written with as many digits as bring back the same bits.
+/// Numbers have as many digits as restore the same bits.
 ///
 /// # Errors
 /// [`RecordingError::Unwritable`], with `path` as its name, if the writer fails.
@@ -22,10 +22,10 @@ pub fn write(recording: &Recording, writer: impl Write, path: &Path) -> Result<(
     result.map_err(|error| RecordingError::Unwritable { path: path.into(), reason: error.to_string() })
 }
 
-/// Name and unit of the quantities of joints, in the order of the columns.
+/// Names and units of the joint quantities, in the order of the columns.
 const OF_JOINTS: [(&str, &str); 4] = [("theta", "rad"), ("rate", "rad_s"), ("torque", "dyn_cm"), ("motor_voltage", "v")];
 
-/// The columns for a number of joints, with or without the nodes' velocities.
+/// Column names for a number of joints, with or without the nodes' velocities.
 fn header(joints: usize, velocities: bool) -> Vec<String> {
     let of_joints = OF_JOINTS.iter().flat_map(|(name, unit)| (1..=joints).map(move |joint| format!("{name}{joint}_{unit}")));
     let of_nodes = (0..joints + 2).flat_map(|node| ["x", "z"].map(|axis| format!("node{node}_{axis}_mm")));
@@ -34,28 +34,25 @@ fn header(joints: usize, velocities: bool) -> Vec<String> {
     std::iter::once("t_s".to_owned()).chain(of_joints).chain(of_nodes).chain(moving).collect()
 }
 
-/// Whether a file begins as a recording does: other tables of this program begin otherwise.
+/// True if a file begins with the columns of a recording, unlike other tables of this program.
 pub fn is_recording(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut start));
     read.is_ok() && start.starts_with(b"t_s,theta1_rad,")
 }
 
-/// Reads a recording that [`write()`] wrote, also one of an older version without the nodes' velocities. y and the velocities as the
-/// reference records them, which are not in it, are NaN. What only the manifest beside it
-/// knows (which joints share an actuator, whether there is a floor) is taken from there; without one, every joint counts as an
-/// actuator, and the words returned say so.
+/// Reads a recording written by [`write()`], also of an older version without the nodes' velocities. y and [`Recording::velocities`], which a CSV
+/// lacks, are NaN. The manifest beside it gives joints per actuator and mount; without one every joint counts as an actuator, and a warning is
+/// returned.
 ///
 /// # Errors
-/// [`RecordingError::Unreadable`] with the line.
+/// [`RecordingError::Unreadable`] with the line, if the file is not such a recording.
 pub fn read_file(path: &Path) -> Result<(Recording, Option<String>), RecordingError> {
     let unreadable = |reason: String| RecordingError::Unreadable { path: path.into(), reason };
     let bytes = files::read(path).map_err(|error| unreadable(error.to_string()))?;
     let mut recording = parse(&bytes).map_err(unreadable)?;
     let joints = recording.joints();
-    let mut manifest = path.as_os_str().to_owned();
-    manifest.push(".manifest.json");
-    let manifest = PathBuf::from(manifest);
+    let manifest = files::with_suffix(path, ".manifest.json");
     let found = files::read_text(&manifest).ok().and_then(|text| serde_json::from_str::<Value>(&text).ok());
     if let Some(meta) =
         found.and_then(|found| meta(&found["resolved_cgs"])).filter(|m| m.actuators * m.motors_per_actuator == joints)
@@ -64,13 +61,13 @@ pub fn read_file(path: &Path) -> Result<(Recording, Option<String>), RecordingEr
         return Ok((recording, None));
     }
     let words = format!(
-        "{} is not there or does not fit: every joint is shown as an actuator, voltages are those of single motors, and no floor is drawn",
+        "{} is missing or does not fit: every joint counts as an actuator, voltages are those of single motors, and no floor is drawn",
         manifest.display()
     );
     Ok((recording, Some(words)))
 }
 
-/// The numbers of a recording from an experiment's [`spec`](crate::experiment::Experiment::spec).
+/// The metadata of a recording from an experiment's [`spec`](crate::experiment::Experiment::spec).
 fn meta(spec: &Value) -> Option<Meta> {
     let count = |key: &str| spec[key].as_u64().and_then(|count| usize::try_from(count).ok());
     let ground = (spec["mount"].as_str()? == "ground").then(|| GroundMeta {
@@ -102,7 +99,7 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
         return Err(format!("line 1: {} columns are not those of a recording", found.len()));
     }
     if let Some((at, (found, wanted))) = found.iter().zip(&wanted).enumerate().find(|(_, (found, wanted))| found != wanted) {
-        return Err(format!("line 1, column {}: {found:?} stands where a recording has {wanted}", at + 1));
+        return Err(format!("line 1, column {}: {found:?} instead of {wanted}", at + 1));
     }
     let mut recording =
         Recording { meta: Meta { actuators: joints, motors_per_actuator: 1, ..Meta::default() }, ..Recording::default() };
@@ -114,8 +111,7 @@ fn parse(bytes: &[u8]) -> Result<Recording, String> {
             .zip(&wanted)
             .map(|(text, name)| {
                 let value = text.parse::<f64>().map_err(|_| format!("line {line}: {name}: {text:?} is not a number"))?;
-                check_values(&[value])
-                    .map_err(|_| format!("line {line}: {name}: {text:?} is no number that a robot comes to"))?;
+                check_values(&[value]).map_err(|_| format!("line {line}: {name}: {text:?} is out of range"))?;
                 Ok(value)
             })
             .collect::<Result<Vec<_>, String>>()?;
@@ -168,7 +164,7 @@ fn rows<W: Write>(recording: &Recording, table: &mut csv::Writer<W>) -> csv::Res
     Ok(())
 }
 
-/// The shortest decimal that reads back as the same number, with an exponent where that is shorter.
+/// The shortest decimal that restores the same bits, with an exponent if that is shorter.
 fn number(value: f64) -> String {
     format!("{value:?}")
 }
@@ -221,10 +217,7 @@ mod tests {
         let header = header(1, false).join(",");
         for (text, words) in [
             ("a,b\n1,2\n".to_owned(), "line 1: 2 columns"),
-            (
-                header.replace("rate1_rad_s", "rate1_deg_s"),
-                "line 1, column 3: \"rate1_deg_s\" stands where a recording has rate1_rad_s",
-            ),
+            (header.replace("rate1_rad_s", "rate1_deg_s"), "line 1, column 3: \"rate1_deg_s\" instead of rate1_rad_s"),
             (format!("{header}\n0,0,0,0,0,0,0,0,0,0,x\n"), "line 2: node2_z_mm: \"x\" is not a number"),
             (format!("{header}\n0,0,0,0,0,0,0,0,0,0,inf\n"), "line 2: node2_z_mm"),
             (format!("{header}\n0,0,0\n"), "line: 2"),

@@ -1,13 +1,13 @@
-//! The measures by name, with their definitions: what `sfers help measures` and docs/measures.md show.
+//! Names and definitions of the measures, for `sfers help measures` and docs/measures.md.
 
 /// A measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Definition {
-    /// Its name, with the unit.
+    /// Name with the unit.
     pub name: &'static str,
-    /// Robots and drives that have it.
+    /// Robots and drives to which it applies.
     pub of: &'static str,
-    /// What it is.
+    /// Definition.
     pub about: &'static str,
 }
 
@@ -18,10 +18,10 @@ const MOBILE: &str = "robots on the ground or free";
 const MOBILE_PERIODIC: &str = "robots on the ground or free, drives with a period";
 const GROUND: &str = "robots on the ground";
 
-/// What the definitions have in common.
+/// Conventions common to all definitions.
 pub const CONVENTIONS: &str = "x and z are those of the nodes: both ends and the joints, x along the flat robot and z upwards from it. The \
     last period is the last whole period of the drive; the last half of the run, in whole periods, stands for the settled state. Measures \
-    are those of the run's steps, however densely it is recorded, but for what is called recorded. A measure that makes no sense for a run is absent, and no measure is given where the simulation went wrong.";
+    are computed from the run's steps, independent of the record interval, except for those named recorded. A measure that does not apply to a run is absent, and a failed simulation has no measures.";
 
 /// All measures, in the order in which they are printed.
 pub static DEFINITIONS: &[Definition] = &[
@@ -39,7 +39,7 @@ pub static DEFINITIONS: &[Definition] = &[
     define(
         "resonance_hz",
         RINGING,
-        "frequency of the largest response, from how the right end's height rings: of half a period the logarithmic decrement δ and the duration Δt, from its turning points; f = √(1 − 2ζ²) / (2 Δt √(1 − ζ²))",
+        "frequency of the largest response, from the ringing of the right end's height: logarithmic decrement δ and duration Δt of half a period, from its turning points; f = √(1 − 2ζ²) / (2 Δt √(1 − ζ²))",
     ),
     define("damping_ratio", RINGING, "ζ = δ / √(π² + δ²) of that mode"),
     define(
@@ -47,12 +47,8 @@ pub static DEFINITIONS: &[Definition] = &[
         RINGING,
         "width of that mode's peak at 1/√2 of its height: 2ζ times its undamped frequency",
     ),
-    define("jump_height_mm", MOBILE, "max over time of min over nodes of z: height of the lowest point at its best"),
-    define(
-        OF_RECORDS,
-        MOBILE,
-        "the same of the records alone, which may miss the moment: what a curve shows that was drawn from records, as the authors' are",
-    ),
+    define("jump_height_mm", MOBILE, "largest height of the lowest point: max over time of min over nodes of z"),
+    define(OF_RECORDS, MOBILE, "jump height of the records alone, which may miss the peak, as in the authors' curves"),
     define("stride_mm", MOBILE_PERIODIC, "travel of the nodes' mean x during the last period"),
     define(
         "speed_mm_s",
@@ -63,7 +59,7 @@ pub static DEFINITIONS: &[Definition] = &[
     define(
         "period_ratio",
         MOBILE_PERIODIC,
-        "periods of the drive after which the nodes' heights repeat, over the last half of the run: 1, 2, or 0 for neither; in runs of six periods or more",
+        "number of periods of the drive after which the nodes' heights repeat, over the last half of the run: 1, 2, or 0 for neither; in runs of six periods or more",
     ),
     define(
         "mid_end_phase_deg",
@@ -84,7 +80,7 @@ pub static DEFINITIONS: &[Definition] = &[
     ),
 ];
 
-/// The measure that depends on what is recorded.
+/// The measure that depends on the record interval.
 pub(crate) const OF_RECORDS: &str = "recorded_jump_height_mm";
 
 const fn define(name: &'static str, of: &'static str, about: &'static str) -> Definition {

@@ -1,4 +1,4 @@
-//! Numbers that a recording is judged by. Each carries its unit in its name.
+//! Measures of a motion, with units in their names.
 
 use serde::Serialize;
 
@@ -7,31 +7,31 @@ use super::accumulator::{MeasureAccumulator, SamplingPlan};
 use crate::model::Mount;
 use crate::model::units::mm_from_cm;
 
-/// Clearance (cm) below which a node touches the floor: a tenth of the collision box's thickness or so, and far above the penetration
-/// of resting contact (measured: 10⁻⁴ cm).
+/// Clearance below which a node touches the floor (cm): well above the 10⁻⁴ cm of resting contact.
 const TOUCHING: f64 = 0.005;
-/// Measures of one run; those that make no sense for its mount or drive are absent.
+
+/// Measures of one run; those that do not apply to its mount or drive are absent.
 ///
-/// A run takes them from steps that it chooses, all of them where an extreme may come (to 0.001 mm), so that they do not depend on how densely it is
-/// recorded; only what is called `recorded` does. A period that begins between two steps begins on the straight line between them.
+/// A run computes them from selected steps, every step near an extreme (to 0.001 mm), so that they do not depend on the record interval; only those
+/// named `recorded` do. The state at the start of a period is interpolated linearly between steps.
 ///
-/// "The last period" is the last whole period of the drive; the last half of the run, in whole periods, is taken for what needs a settled
-/// state. x and z are those of the nodes.
+/// "The last period" is the last whole period of the drive; measures of the settled state use the last half of the run in whole periods. x and z
+/// are those of the nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Measures {
-    /// Height of the right end above the flat robot in the last record (mm): z of the last node. Clamped robots.
+    /// Height of the right end above the flat robot in the last record (mm), z of the last node. Clamped robots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_deflection_mm: Option<f64>,
-    /// Half the difference between the largest and smallest height of the right end over the last period, or over the whole run if the
-    /// drive has none (mm). Clamped robots.
+    /// Half the difference between the largest and smallest height of the right end over the last period, or over the whole run of a
+    /// drive without a period (mm). Clamped robots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_amplitude_mm: Option<f64>,
     /// Phase of the right end's height against the voltage of the first actuator, both at the drive's frequency over the last half of
     /// the run (deg): 0 for slow drives, negative for a lag. Clamped robots with a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_phase_deg: Option<f64>,
-    /// Frequency of the largest response (Hz), from how the right end rings after the last change of voltage: see [`Mode::of_ringing`](super::signal::Mode::of_ringing). Clamped
-    /// robots whose voltage does not repeat.
+    /// Frequency of the largest response (Hz), from the ringing of the right end after the last change of voltage: see
+    /// [`Mode::of_ringing`](super::signal::Mode::of_ringing). Clamped robots, drives without a period.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resonance_hz: Option<f64>,
     /// Damping ratio of that mode (–).
@@ -40,10 +40,10 @@ pub struct Measures {
     /// Width of its peak at 1/√2 of the height (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_power_bandwidth_hz: Option<f64>,
-    /// Height of the lowest point at its best: max over time of min over nodes of z (mm). Robots that are not clamped.
+    /// Largest height of the lowest point: max over time of min over nodes of z (mm). Robots that are not clamped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub jump_height_mm: Option<f64>,
-    /// The same of the records alone, which may miss the moment (mm): what a curve shows that was drawn from records, as the authors' are.
+    /// Jump height of the records alone, which may miss the peak (mm), as in the authors' curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded_jump_height_mm: Option<f64>,
     /// Travel of the nodes' mean x during the last period (mm). Robots that are not clamped, with a period.
@@ -79,7 +79,7 @@ pub struct Measures {
     pub energy_error: Option<f64>,
 }
 
-/// How a robot touches the floor at one time.
+/// Contact of a robot with the floor at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactState {
     /// A node other than the two at each end touches.
@@ -90,7 +90,7 @@ pub enum ContactState {
     Aerial,
 }
 
-/// How the robot touches the floor in each record. A node touches if it is less than 0.05 mm above its height on the flat robot.
+/// Contact state in each record. A node touches if it is less than 0.05 mm above its height on the flat robot.
 pub fn contact_states(recording: &Recording) -> Vec<ContactState> {
     let mut nodes = vec![[0.0; 2]; recording.nodes()];
     let state = |record| {
@@ -100,7 +100,7 @@ pub fn contact_states(recording: &Recording) -> Vec<ContactState> {
     (0..recording.len()).map(state).collect()
 }
 
-/// The state of contact of nodes at x and z (cm), and the height of the lowest (cm).
+/// Contact state of nodes at x, z (cm), and the height of the lowest node (cm).
 pub(super) fn contact_state(nodes: &[[f64; 2]]) -> (ContactState, f64) {
     let lowest = |nodes: &[[f64; 2]]| nodes.iter().fold(f64::INFINITY, |low, &[_, z]| if z < low { z } else { low });
     let inner = 2..nodes.len().saturating_sub(2);
@@ -116,7 +116,7 @@ pub(super) fn contact_state(nodes: &[[f64; 2]]) -> (ContactState, f64) {
     (state, body.min(ends))
 }
 
-/// Writes x and z (cm) of the nodes of a record.
+/// Copies x and z (cm) of the nodes in a record.
 fn copy_nodes(recording: &Recording, record: usize, to: &mut [[f64; 2]]) {
     for (node, to) in to.iter_mut().enumerate() {
         let [x, _, z] = recording.node(record, node);
@@ -132,8 +132,8 @@ pub(crate) fn recorded_jump_height(recording: &Recording) -> f64 {
 }
 
 impl Measures {
-    /// Takes the measures of a `recording` of others: all that happened between its records is unknown here, and a run's own measures,
-    /// [`Run::measures`](crate::experiment::Run), are those to use where there are such. `period` (s) is the drive's, if it repeats.
+    /// Computes measures from the records of a recording; the motion between records is unknown, so prefer a run's own measures,
+    /// [`Run::measures`](crate::experiment::Run). `period` (s): that of the drive, if it repeats.
     pub fn of(recording: &Recording, mount: Mount, period: Option<f64>) -> Self {
         let (Some(&first), Some(&last)) = (recording.time.first(), recording.time.last()) else { return Self::default() };
         let samples = recording.len();
@@ -153,7 +153,7 @@ impl Measures {
         measures
     }
 
-    /// Name and value of every measure that is present.
+    /// Names and values of the measures that are present.
     pub fn named(&self) -> Vec<(String, f64)> {
         let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(self) else { return Vec::new() };
         fields.into_iter().filter_map(|(name, value)| Some((name, value.as_f64()?))).collect()

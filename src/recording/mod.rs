@@ -1,4 +1,4 @@
-//! What a run leaves behind: a trajectory with the numbers needed to read it.
+//! Recordings: trajectories with their metadata, their files and their measures.
 
 pub(crate) mod accumulator;
 pub mod csv;
@@ -34,25 +34,25 @@ pub enum RecordingError {
     },
 }
 
-/// The most numbers that a recording holds (3.2 GB).
+/// Largest number of values in a recording (3.2 GB).
 pub(crate) const MAX_VALUES: f64 = 4e8;
 
-/// Checks numbers that were read, in CGS units: up to a size of 1e100 their squares and all that is drawn of them are numbers too.
+/// Checks values that were read: below 1e100 their squares are finite.
 fn check_values(values: &[f64]) -> Result<(), String> {
     match values.iter().position(|value| value.is_nan() || value.abs() > 1e100) {
-        Some(at) => Err(format!("number {} of it is {}, which no robot comes to", at + 1, values[at])),
+        Some(at) => Err(format!("value {} is {}, which is out of range", at + 1, values[at])),
         None => Ok(()),
     }
 }
 
-/// Numbers that go with a trajectory.
+/// Metadata of a trajectory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Meta {
     /// Time step (s).
     pub time_step: f64,
     /// Number of steps that were simulated.
     pub steps: u64,
-    /// Every how many steps a record was taken.
+    /// Steps between records.
     pub record_every: u64,
     /// Number of actuators, N.
     pub actuators: usize,
@@ -60,22 +60,22 @@ pub struct Meta {
     pub motors_per_actuator: usize,
     /// Length of one actuator (cm).
     pub actuator_length: f64,
-    /// Drive frequency (Hz); 1 where the drive has none, as in the reference.
+    /// Drive frequency (Hz); 1 for drives without one, as in the reference.
     pub driven_frequency: f64,
     /// The reference's `dampingEta` (–).
     pub damping_eta: f64,
-    /// For robots on the ground, as the reference saves them: low and high friction (–), and the gait's period or delay (s).
+    /// Further metadata of robots on the ground.
     pub ground: Option<GroundMeta>,
 }
 
-/// What the reference saves of a robot on the ground besides.
+/// Metadata that the reference saves for robots on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroundMeta {
     /// Friction of the bare robot (–).
     pub friction_low: f64,
     /// Friction of the films (–).
     pub friction_high: f64,
-    /// Period or delay (s); 0 where the drive has none.
+    /// Period or delay of the gait (s); 0 for drives without one.
     pub period: f64,
     /// Date and time of the run, MM_DD_YYYY_HH_MM.
     pub date_time: String,
@@ -83,11 +83,11 @@ pub struct GroundMeta {
 
 /// A trajectory: T records of J = N·m joints and J + 2 nodes, each array row after row.
 ///
-/// Every record is the state before a step, with the torques of that step. Nodes are the left end, each joint and the right end, on
-/// the centre line; the joints' places lag one step behind the left end's (see [`BulletEngine`](crate::engine::BulletEngine)).
+/// A record is the state before a step, with the torques of that step. Nodes are the left end, each joint and the right end, on the centre line; the
+/// positions of joints lag one step behind that of the left end (see [`BulletEngine`](crate::engine::BulletEngine)).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
-    /// Numbers that go with it.
+    /// Metadata.
     pub meta: Meta,
     /// Time (s), T values.
     pub time: Vec<f64>,
@@ -99,14 +99,12 @@ pub struct Recording {
     pub torques: Vec<f64>,
     /// Voltage on each joint, the actuator's divided by m (V), T × J.
     pub motor_voltages: Vec<f64>,
-    /// Nodes (cm), T × (J + 2) × 3.
+    /// Positions of the nodes (cm), T × (J + 2) × 3.
     pub positions: Vec<f64>,
-    /// Velocities as the reference records them (cm/s), T × (J + 2) × 3. On Bullet: the left end's own, for each joint that of the centre of
-    /// mass of the link behind it, one step late, and for the right end that centre's with a whole link as lever. On the planar engine:
-    /// the nodes' own.
+    /// Velocities as in the reference (cm/s), T × (J + 2) × 3. On Bullet: of the left end; for each joint, of the centre of mass of the next link
+    /// one step late; for the right end, of that centre with a whole link as lever. On the planar engine: of the nodes.
     pub velocities: Vec<f64>,
-    /// Velocities of the nodes themselves at the recorded time, on either engine (cm/s), T × (J + 2) × 3; empty if they are not known, as in
-    /// files of the reference.
+    /// Velocities of the nodes at the recorded time (cm/s), T × (J + 2) × 3; empty if unknown, as in files of the reference.
     pub node_velocities: Vec<f64>,
 }
 
@@ -116,7 +114,7 @@ impl Recording {
         self.time.len()
     }
 
-    /// Whether nothing was recorded.
+    /// True if there are no records.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
@@ -131,13 +129,13 @@ impl Recording {
         self.joints() + 2
     }
 
-    /// Centre of mass (cm) in a record, x, y, z: each actuator's mass is spread evenly between the nodes, so links weigh by length.
+    /// Centre of mass x, y, z (cm) in a record, with the mass spread evenly along the links.
     ///
     /// ```text
     /// r = (Σ w_i r_i)/(Σ w_i)    w: half the links on either side of a node
     /// ```
     ///
-    /// The ends' links are half as long as the others, so the ends weigh a quarter and their neighbours three quarters of an inner node.
+    /// The end links are half as long as the others, so the end nodes have a quarter and their neighbours three quarters of an inner node's weight.
     pub fn centre_of_mass(&self, record: usize) -> [f64; 3] {
         let last = self.nodes() - 1;
         let length = |link: usize| if link == 0 || link + 1 == last { 0.5 } else { 1.0 };
@@ -152,7 +150,7 @@ impl Recording {
         [sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3]]
     }
 
-    /// Position (cm) of a node in a record: x, y, z.
+    /// Position x, y, z (cm) of a node in a record.
     pub fn node(&self, record: usize, node: usize) -> [f64; 3] {
         let at = 3 * (record * self.nodes() + node);
         [self.positions[at], self.positions[at + 1], self.positions[at + 2]]

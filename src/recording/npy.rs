@@ -1,14 +1,13 @@
-//! One array of numpy's NPY format, as it may stand in a file of anyone: nothing is believed that the content does not bear out.
+//! Arrays of numpy's NPY format from untrusted files: the header is checked against the content.
 //!
-//! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>. Memory is taken as data arrive, and never for more
-//! than the header claims.
+//! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>. Memory grows with the data read, up to the size in the header.
 
 use std::io::Read;
 
 use ndarray::{ArrayD, IxDyn, ShapeBuilder};
 use py_literal::Value;
 
-/// The longest header that is read (bytes); numpy writes 128 for arrays of numbers.
+/// Longest header that is read (bytes); numpy writes 128 for arrays of numbers.
 const LONGEST_HEADER: usize = 4096;
 
 /// An array of numbers, in C order.
@@ -18,7 +17,7 @@ pub struct Array {
     pub values: Vec<f64>,
 }
 
-/// What a header says.
+/// The fields of a header.
 struct Header {
     descr: String,
     fortran_order: bool,
@@ -28,7 +27,7 @@ struct Header {
 /// Reads an array of floats or integers of at most `most` numbers.
 ///
 /// # Errors
-/// What is wrong, in words.
+/// A message, if the header or the content is not that of such an array.
 pub fn read(mut reader: impl Read, most: usize) -> Result<Array, String> {
     let Header { descr, fortran_order, shape } = header(&mut reader)?;
     let size = element_size(&descr)?;
@@ -78,7 +77,7 @@ fn header(reader: &mut impl Read) -> Result<Header, String> {
     let mut text = vec![0; length];
     read(&mut text)?;
     let text = String::from_utf8(text).map_err(|_| "its header is not text")?;
-    // The parser of literals calls itself for every bracket.
+    // The parser of literals recurses at every bracket.
     if text.bytes().filter(|b| b"([{".contains(b)).count() > 8 {
         return Err("its header is not that of an array of numbers".into());
     }
@@ -103,7 +102,7 @@ fn element_size(descr: &str) -> Result<usize, String> {
     }
 }
 
-/// One number, from as many bytes as [`element_size`] says.
+/// One number from [`element_size`] bytes.
 fn number(descr: &str, bytes: &[u8]) -> f64 {
     let mut little = [0; 8];
     little[..bytes.len()].copy_from_slice(bytes);

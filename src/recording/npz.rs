@@ -3,9 +3,9 @@
 //! Written: `dataTime` (T), `dataTheta`, `dataAngularVelocities`, `dataTor`, `dataMotorVoltages` (T, J), `dataPositions`,
 //! `dataPositionVelocities` (T, J+2, 3), and as scalars `timeStep`, `simCycles`, `recordStepInterval`, `N`, `m`, `actuatorLength`,
 //! `drivenFrequency`, `dampingEta`; for robots on the ground also `dateTime`, `frictionLow`, `frictionHigh`, `period`.
-//! CGS units, as the reference. Beyond the reference: `nodes_velocity` (T, J+2, 3), the velocities of the nodes themselves, which
-//! `dataPositionVelocities` holds for the planar engine only (see [`Recording::velocities`]). Read: the same; `dateTime` and keys that
-//! are not listed are ignored, `dampingEta`, `nodes_velocity` and the keys of robots on the ground may be missing.
+//! CGS units, as in the reference. Extension: `nodes_velocity` (T, J+2, 3), the velocities of the nodes, which `dataPositionVelocities` holds
+//! for the planar engine only (see [`Recording::velocities`]). On reading, `dateTime` and other keys are ignored; `dampingEta`, `nodes_velocity` and
+//! the keys of robots on the ground may be missing.
 
 use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
@@ -46,10 +46,10 @@ impl WritableElement for DateTime {
 /// Writes a recording.
 ///
 /// # Errors
-/// [`RecordingError::Unwritable`], with `path` as its name, if the writer fails.
+/// [`RecordingError::Unwritable`], with `path` for the message, if the writer fails.
 pub fn write(recording: &Recording, writer: impl Write, path: &Path) -> Result<(), RecordingError> {
     let unwritable = |error: &dyn std::fmt::Display| RecordingError::Unwritable { path: path.into(), reason: error.to_string() };
-    // The zip format needs to seek, so the archive is made in memory.
+    // The zip format needs to seek, so the archive is built in memory.
     let mut archive = NpzWriter::new_compressed(Cursor::new(Vec::new()));
     let bytes = fill(recording, &mut archive).and_then(|()| archive.finish()).map_err(|error| unwritable(&error))?;
     let mut writer = writer;
@@ -104,10 +104,10 @@ fn fill<W: Write + Seek>(recording: &Recording, archive: &mut NpzWriter<W>) -> R
     Ok(())
 }
 
-/// Reads a recording, one of this program's or of the reference's.
+/// Parses a recording of this program or of the reference.
 ///
 /// # Errors
-/// [`RecordingError::Unreadable`], with `path` as its name, if the archive is damaged, a key is missing or a shape does not fit.
+/// [`RecordingError::Unreadable`], with `path` for the message, if the archive is damaged, a key is missing or a shape does not fit.
 pub fn read(bytes: &[u8], path: &Path) -> Result<Recording, RecordingError> {
     parse(bytes).map_err(|reason| RecordingError::Unreadable { path: path.into(), reason })
 }
@@ -126,7 +126,7 @@ pub fn read_file(path: &Path) -> Result<Recording, RecordingError> {
 struct Arrays<R: Read + Seek>(ZipArchive<R>);
 
 impl<R: Read + Seek> Arrays<R> {
-    /// An array, whose header and content must agree.
+    /// An array whose header and content agree.
     fn array(&mut self, key: &str) -> Result<Array, String> {
         let name = format!("{key}.npy");
         let name = if self.0.index_for_name(&name).is_some() { name.as_str() } else { key };
@@ -145,13 +145,13 @@ impl<R: Read + Seek> Arrays<R> {
         Ok(array.values)
     }
 
-    /// The same, or nothing where there is no such key.
+    /// The values of a float array of the given shape; empty if the key is missing.
     fn values_if_there(&mut self, key: &str, shape: &[usize]) -> Result<Vec<f64>, String> {
         let there = self.0.file_names().any(|name| name.strip_suffix(".npy").unwrap_or(name) == key);
         if there { self.values(key, shape) } else { Ok(Vec::new()) }
     }
 
-    /// A scalar, stored as a float or an integer.
+    /// A scalar, float or integer.
     fn number(&mut self, key: &str) -> Result<f64, String> {
         match self.array(key)?.values[..] {
             [value] => Ok(value),
@@ -170,7 +170,7 @@ impl<R: Read + Seek> Arrays<R> {
     }
 }
 
-/// What the zip reader says, in plain words.
+/// The zip reader's error in plain words.
 fn plain(error: &ZipError) -> String {
     match error {
         ZipError::FileNotFound => "is missing".into(),
@@ -283,7 +283,7 @@ mod tests {
         recording.meta.motors_per_actuator = 2;
         recording.angles.extend([0.0; 6]);
         recording.rates.truncate(0);
-        // Shapes that contradict each other cannot be written through this module, so an archive is put together by hand.
+        // This module cannot write inconsistent shapes, so the archive is built by hand.
         let mut archive = NpzWriter::new(Cursor::new(Vec::new()));
         for (key, value) in [("N", 1_i64), ("m", 2)] {
             archive.add_array(key, &arr0(value)).unwrap();
@@ -350,8 +350,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_no_robot_comes_to_and_times_that_do_not_rise_are_refused_by_their_key() {
-        for (bad, words) in [(f64::NAN, "number 2 of it is NaN"), (f64::INFINITY, "inf"), (-1e200, "-1")] {
+    fn values_out_of_range_and_times_that_do_not_rise_are_refused_by_their_key() {
+        for (bad, words) in [(f64::NAN, "value 2 is NaN"), (f64::INFINITY, "inf"), (-1e200, "-1")] {
             let mut recording = sample(3);
             recording.rates[1] = bad;
             let error = read(&bytes(&recording), Path::new("bad.npz")).unwrap_err().to_string();

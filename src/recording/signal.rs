@@ -1,8 +1,8 @@
-//! Numbers out of signals: harmonics, ringing, resonance peaks, repetition.
+//! Signal analysis: harmonics, ringing, resonance peaks, repetition.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A sine at one frequency with a mean: x = mean + c cos ωt + s sin ωt, in the unit of the signal.
+/// A harmonic with mean: x = mean + c cos ωt + s sin ωt, in the unit of the signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Harmonic {
     /// Mean.
@@ -13,14 +13,14 @@ pub struct Harmonic {
     pub sin: f64,
 }
 
-/// Least squares of one harmonic of `N` signals with common times, added up sample by sample. Each sample weighs as long as it stands for, half the
-/// time to its neighbours, so that it does not matter how many there are; where the stretch begins between two a straight line is laid.
+/// Least-squares fit of one harmonic to `N` signals with common times, summed sample by sample. A sample weighs half the time to its neighbours, so
+/// that the sampling density does not matter; the start of the interval is interpolated linearly.
 #[derive(Debug, Clone)]
 pub struct HarmonicSums<const N: usize> {
     frequency: f64,
     from: f64,
     samples: usize,
-    /// Time and values of the last sample, and the time for which it stands so far.
+    /// Time (s) and values of the last sample, and its weight so far (s).
     last: Option<(f64, [f64; N], f64)>,
     normal: Matrix3<f64>,
     right: [Vector3<f64>; N],
@@ -29,7 +29,7 @@ pub struct HarmonicSums<const N: usize> {
 }
 
 impl<const N: usize> HarmonicSums<N> {
-    /// Of `frequency` (Hz) from the time `from` (s) on, without samples.
+    /// Empty sums at `frequency` (Hz) from the time `from` (s) on.
     pub fn new(frequency: f64, from: f64) -> Self {
         let (normal, right, largest) = (Matrix3::zeros(), [Vector3::zeros(); N], [0.0; N]);
         Self { frequency, from, samples: 0, last: None, normal, right, largest }
@@ -62,7 +62,7 @@ impl<const N: usize> HarmonicSums<N> {
         }
     }
 
-    /// The harmonic of each signal; `None` if the samples cannot tell its three numbers apart.
+    /// The harmonic of each signal; `None` if the samples do not determine its three parameters.
     pub fn fit(&self) -> Option<[Harmonic; N]> {
         let mut all = self.clone();
         if let Some((time, values, stands)) = self.last {
@@ -75,7 +75,7 @@ impl<const N: usize> HarmonicSums<N> {
         }))
     }
 
-    /// The phase (deg) of each signal that moves at the frequency, by more than rounding.
+    /// The phase (deg) of each signal whose amplitude exceeds rounding.
     pub fn phases_deg(&self) -> [Option<f64>; N] {
         let fit = self.fit();
         std::array::from_fn(|k| fit.map(|fit| fit[k]).filter(|f| f.amplitude() > 1e-9 * self.largest[k]).map(|f| f.phase_deg()))
@@ -88,7 +88,7 @@ impl Harmonic {
         self.cos.hypot(self.sin)
     }
 
-    /// Phase (deg) of A cos(ωt + φ): between −180 and 180, negative for a lag.
+    /// Phase φ (deg) of A cos(ωt + φ), between −180 and 180, negative for a lag.
     pub fn phase_deg(&self) -> f64 {
         (-self.sin).atan2(self.cos).to_degrees()
     }
@@ -103,25 +103,25 @@ pub fn phase_difference_deg(a: f64, b: f64) -> f64 {
 /// One mode of vibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mode {
-    /// Frequency at which a sine drives it furthest (Hz).
+    /// Frequency of the largest response to a sinusoidal drive (Hz).
     pub resonance_hz: f64,
     /// Damping ratio ζ (–).
     pub damping_ratio: f64,
-    /// Width of the peak at 1/√2 of its height (Hz).
+    /// Width of the resonance peak at 1/√2 of its height (Hz).
     pub half_power_bandwidth_hz: f64,
 }
 
 impl Mode {
-    /// A mode from the ringing that follows a step, by its turning points.
+    /// The mode of the ringing after a step, from turning points; `times` (s).
     ///
     /// ```text
     /// ln(swing_i) = const − i δ,    ζ = δ/√(π² + δ²),    f_d = 1/(2 Δt),    f_n = f_d/√(1−ζ²),    f_r = f_n √(1 − 2ζ²)
     /// ```
     ///
-    /// δ: logarithmic decrement of half a period, Δt: mean time between turning points, both from a straight line through all swings above
-    /// 1 % of the first. Differences of neighbouring turning points do not depend on where the signal comes to rest. The width of the
-    /// peak is 2 ζ f_n, right for light damping. `None` if there are fewer than three swings, if the mode is too damped to peak, or if the swings
-    /// do not die out: their logarithms fall by less than 1 % in all, or by less than two standard errors of the line's slope.
+    /// δ: logarithmic decrement of half a period, Δt: mean time between turning points, both from linear fits to all swings above 1 % of the
+    /// first. Differences of neighbouring turning points do not depend on the rest position. The peak width 2 ζ f_n holds for light damping.
+    /// `None` if there are fewer than three swings, if the mode is too damped for a peak, or if the swings do not decay: their logarithms fall by less
+    /// than 0.01 in all, or by less than two standard errors of the slope.
     ///
     /// # References
     /// D. J. Inman, *Engineering Vibration*, sections 1.6 (logarithmic decrement) and 2.2 (resonance peak).
@@ -149,9 +149,9 @@ impl Mode {
         })
     }
 
-    /// A mode from a frequency response, `amplitudes` at rising `frequencies` (Hz): the top of the parabola through the largest amplitude
-    /// and its neighbours, the width where straight lines between the points cross 1/√2 of it, ζ = width/(2 f). `None` if the largest
-    /// amplitude stands at an end or the response does not fall far enough on both sides.
+    /// The mode of a frequency response, `amplitudes` at increasing `frequencies` (Hz): peak of the parabola through the largest amplitude and its
+    /// neighbours, width by linear interpolation at 1/√2 of the peak, ζ = width/(2 f). `None` if the largest amplitude is at an end or the
+    /// response does not fall below 1/√2 on both sides.
     pub fn of_response(frequencies: &[f64], amplitudes: &[f64]) -> Option<Self> {
         let top = (0..amplitudes.len()).max_by(|&a, &b| amplitudes[a].total_cmp(&amplitudes[b]))?;
         if top == 0 || top + 1 >= amplitudes.len() {
@@ -170,12 +170,12 @@ impl Mode {
     }
 }
 
-/// Decay of all swings together below which they are taken for constant: what interpolation between samples leaves open.
+/// Total logarithmic decay below which swings count as constant: the error of interpolation between samples.
 const LEAST_DECAY: f64 = 0.01;
-/// Share of the last swing by which a signal must turn back for a turning point to count: passes over ripples of higher modes.
+/// Share of the last swing by which a signal must reverse for a turning point, to ignore ripples of higher modes.
 const HYSTERESIS: f64 = 0.05;
 
-/// Time and value of the turning points of a signal, between samples by a parabola; the ends do not count.
+/// Times and values of a signal's turning points, interpolated by parabolas, without the ends.
 fn turning_points(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let mut turns = Vec::new();
     let Some(&start) = values.first() else { return turns };
@@ -199,7 +199,7 @@ fn turning_points(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     turns
 }
 
-/// Where a parabola through three points has its top or bottom.
+/// Vertex of the parabola through three points; `None` if they are collinear.
 pub(super) fn parabola_top([x0, x1, x2]: [f64; 3], [y0, y1, y2]: [f64; 3]) -> Option<(f64, f64)> {
     let (left, right) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
     let curvature = (right - left) / (x2 - x0);
@@ -210,7 +210,7 @@ pub(super) fn parabola_top([x0, x1, x2]: [f64; 3], [y0, y1, y2]: [f64; 3]) -> Op
     Some((x, y0 + left * (x - x0) + curvature * (x - x0) * (x - x1)))
 }
 
-/// Slope of the straight line through values at 0, 1, 2, …
+/// Slope of the linear fit to values at 0, 1, 2, …
 fn slope(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let middle = 0.5 * (n - 1.0);
@@ -221,7 +221,7 @@ fn slope(values: &[f64]) -> f64 {
     up / down
 }
 
-/// Standard error of that slope, from how far the values lie off the line.
+/// Standard error of the slope of a linear fit, from the residuals.
 fn slope_error(values: &[f64], slope: f64) -> f64 {
     let n = values.len() as f64;
     let (middle, mean) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
@@ -232,27 +232,26 @@ fn slope_error(values: &[f64], slope: f64) -> f64 {
     (off / (n - 2.0).max(1.0) / down).sqrt()
 }
 
-/// Points of time in a period at which [`Repetition`] compares.
+/// Number of times in a period at which [`Repetition`] compares.
 const POINTS: usize = 100;
 
-/// How far the heights of a system's nodes differ from what they were one or two periods before, as a share of what unrelated motion would
-/// give: 0 repeats, 1 does not.
+/// Difference of the nodes' heights from those one or two periods earlier, relative to unrelated motion: 0 for repeated motion, 1 for unrelated.
 ///
 /// ```text
 /// r = √(⟨|z(t) − z(t−T)|²⟩ / (2 ⟨|z − ⟨z⟩|²⟩))
 /// ```
 ///
-/// at 100 points of time in a period, between samples by straight lines.
+/// at 100 times per period, interpolated linearly between samples.
 #[derive(Debug, Clone)]
 pub struct Repetition {
     period: f64,
-    /// When the motion begins and ends (s).
+    /// Start and end of the motion (s).
     ends: [f64; 2],
-    /// Points in the window, and those taken so far with the two periods before it.
+    /// Number of points in the window, and of those taken so far including the two periods before it.
     points: usize,
     taken: usize,
     nodes: usize,
-    /// Heights at the points of the last two periods, row after row.
+    /// Heights (cm) at the points of the last two periods, points × nodes.
     rows: Vec<f64>,
     /// Sums over the window of |z(t) − z(t−T)|² for T of one and of two periods.
     changes: [f64; 2],
@@ -261,13 +260,13 @@ pub struct Repetition {
 }
 
 impl Repetition {
-    /// Over the last `pairs` of pairs of periods (s) of a motion that begins and ends at `ends` (s), at least a pair earlier.
+    /// Compares over the last `pairs` pairs of periods (s) of a motion with start and end `ends` (s), which begins at least one pair earlier.
     pub fn new(period: f64, pairs: usize, ends: [f64; 2], nodes: usize) -> Self {
         let (rows, sums) = (vec![0.0; 2 * POINTS * nodes], vec![[0.0; 2]; nodes]);
         Self { period, ends, points: 2 * pairs * POINTS, taken: 0, nodes, rows, changes: [0.0; 2], sums }
     }
 
-    /// The points of time up to the sample `now`, a time (s) and the nodes' x and z, from the sample before on.
+    /// Takes the points between the previous sample and `now`, each a time (s) and the nodes' x, z (cm).
     pub fn take(&mut self, before: Option<(f64, &[[f64; 2]])>, now: (f64, &[[f64; 2]])) {
         while self.taken <= self.points + 2 * POINTS {
             let to_go = (self.points + 2 * POINTS - self.taken) as f64;
@@ -297,12 +296,12 @@ impl Repetition {
         self.taken += 1;
     }
 
-    /// Whether the motion has come to its end.
+    /// True if the motion has reached its end.
     pub fn is_complete(&self) -> bool {
         self.taken > self.points + 2 * POINTS
     }
 
-    /// r for 1 or 2 `periods`; `None` if the motion has not come to its end, or nothing moves.
+    /// r for 1 or 2 `periods`; `None` if the motion has not reached its end, or nothing moves.
     pub fn of(&self, periods: usize) -> Option<f64> {
         let n = self.points as f64;
         let spread: f64 = self.sums.iter().map(|[sum, squares]| squares - sum * sum / n).sum();

@@ -9,14 +9,14 @@ use crate::sweep::Sweep;
 use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, shape, signed};
 
-/// Measured deflection of the tip at −1000 V (mm), and frequencies (Hz) of the largest response: measured, and the authors' simulation.
+/// Measured deflection of the tip at −1000 V (mm); resonances (Hz), measured and simulated by the authors.
 const DEFLECTION: f64 = -20.0;
 const MEASURED_HZ: f64 = 23.0;
 const SIMULATED_HZ: f64 = 25.0;
 
 const SETS: [(&str, &str); 2] = [("set 2", "material.preset=parameter-2"), ("set 4", "material.preset=parameter-4")];
 
-/// Frequencies (Hz) at which Bullet runs as well, and its time step there (s).
+/// Frequencies (Hz) of the spot checks on Bullet, and their time step (s).
 const SPOTS_HZ: [f64; 4] = [5.0, 15.0, 25.0, 40.0];
 const SPOTS_STEP: f64 = 5e-6;
 
@@ -26,7 +26,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     figure.setting("from above: 0, −600, −800 and −1000 V; m = 3").size(WHOLE);
     let mut left = 0.0;
     for (name, set) in SETS {
-        // One line for all voltages, broken between them: a set is one entry of the legend.
+        // One interrupted line for all voltages, so that a set has one legend entry.
         let mut shapes = Vec::new();
         for volts in [0, -600, -800, -1000] {
             let (_, run) = bench.run("cantilever-dc", None, &[set, &format!("drive.voltages_v=[{volts}]")])?;
@@ -61,7 +61,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     Ok(findings)
 }
 
-/// Where along x (mm) a circular arc as long as the actuator ends that is `deflection` (mm) high.
+/// x (mm) of the end of a circular arc of the actuator's length with height `deflection` (mm).
 fn arc_end(deflection: f64) -> f64 {
     let length = mm_from_cm(Material::PARAMETER_2.actuator_length);
     // z = L (1 − cos φ)/φ is the deflection; φ = 2z/L to begin with.
@@ -79,7 +79,7 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
         let id = format!("cantilever-response-{}", name.replace(' ', "-"));
         let mut sweep = Sweep::open("preset:cantilever-frequency-scan".as_ref(), &[set.into()])?;
         let axis = sweep.axes.len() - 1;
-        // Set 4 is there for its resonance, which m = 3 shows.
+        // Set 4 is compared for m = 3 only.
         if name == "set 4" {
             sweep.axes[axis - 1].values.retain(|m| m.as_integer() == Some(3));
         }
@@ -93,55 +93,19 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
         let chains: Vec<_> = sweep.axes[axis - 1].values.iter().filter_map(toml::Value::as_integer).collect();
         for (block, m) in points.chunks(sweep.axes[axis].values.len()).zip(chains) {
             let response = curve(&sweep, block, axis, 0);
-            let (frequencies, amplitudes): (Vec<f64>, Vec<f64>) = response.iter().copied().filter(|p| p.1.is_finite()).unzip();
             let beam = analytic::cantilever_frequency(&sweep.experiment(0)?.robot);
             figure.series(&format!("planar engine, m = {m}, {name}"), response.clone(), Mark::Both);
-            highest = amplitudes.iter().copied().fold(highest, f64::max);
+            highest = response.iter().map(|p| p.1).filter(|amplitude| amplitude.is_finite()).fold(highest, f64::max);
             if (m, name) == (3, "set 2") {
-                for &(f, bullet) in &spots {
-                    let planar = response.iter().find(|p| p.0 == f).map_or(f64::NAN, |p| p.1);
-                    findings.compare(
-                        &format!("amplitude at {f} Hz, m = 3, {name}"),
-                        "",
-                        format!("{} mm", fixed(planar, 2)),
-                        "",
-                        "",
-                    );
-                    findings.check_on_bullet("mm", planar, bullet);
-                }
+                compare_spots(&mut findings, name, &response, &spots);
             }
-            let lost: Vec<f64> = response.iter().filter(|p| !p.1.is_finite()).map(|p| p.0).collect();
-            let none = match (lost.first(), lost.last()) {
-                (Some(low), Some(high)) => {
-                    format!("lies between {low} and {high} Hz, where runs failed")
-                }
-                _ => "no peak below 40 Hz".into(),
-            };
-            // A gap may hide the peak, so a response with one has none.
-            let peak = if lost.is_empty() { Mode::of_response(&frequencies, &amplitudes) } else { None };
-            let (ours, difference) = peak.map_or((none, String::new()), |peak| {
-                (
-                    format!("{:.1} Hz, half-power width {:.1} Hz", peak.resonance_hz, peak.half_power_bandwidth_hz),
-                    format!(
-                        "{} % of 25 Hz, {} % of 23 Hz",
-                        signed(100.0 * (peak.resonance_hz / SIMULATED_HZ - 1.0), 0),
-                        signed(100.0 * (peak.resonance_hz / MEASURED_HZ - 1.0), 0)
-                    ),
-                )
-            });
             let explanation = match m {
                 1 => "One joint is too coarse for the beam, as the paper says too; but with the constants of set 2 it is what gives the paper's simulated 25 Hz.".into(),
                 _ => format!(
                     "The beam of {name} has its first frequency at {beam:.1} Hz whatever m is; 25 Hz needs constants that were not published."
                 ),
             };
-            findings.compare(
-                &format!("resonance, m = {m}, {name}"),
-                "25 Hz (simulated, m ≥ 3), 23 Hz (measured)",
-                ours,
-                difference,
-                &explanation,
-            );
+            compare_resonance(&mut findings, &format!("m = {m}, {name}"), &response, &explanation);
         }
     }
     figure.series("Bullet, m = 3, set 2", spots, Mark::Points);
@@ -150,6 +114,35 @@ pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
     findings.figure = figure.svg();
     findings.caption = "Half the swing of the tip over the last period of 2 s; dampingEta 0.008, the classes' value. The upright lines stand at the published resonances, whose amplitudes are not given. The swing is as large as the beam is long near resonance, so the peaks are not those of a linear beam.".into();
     Ok(findings)
+}
+
+/// Compares amplitudes (mm) of the planar engine with those on Bullet at the frequencies of the `spots` (Hz).
+fn compare_spots(findings: &mut Findings, set: &str, response: &[(f64, f64)], spots: &[(f64, f64)]) {
+    for &(f, bullet) in spots {
+        let planar = response.iter().find(|p| p.0 == f).map_or(f64::NAN, |p| p.1);
+        findings.compare(&format!("amplitude at {f} Hz, m = 3, {set}"), "", format!("{} mm", fixed(planar, 2)), "", "");
+        findings.check_on_bullet("mm", planar, bullet);
+    }
+}
+
+/// Compares the resonance of a response, frequencies (Hz) and amplitudes (mm), with the published ones.
+fn compare_resonance(findings: &mut Findings, chain: &str, response: &[(f64, f64)], explanation: &str) {
+    let lost: Vec<f64> = response.iter().filter(|p| !p.1.is_finite()).map(|p| p.0).collect();
+    let none = match (lost.first(), lost.last()) {
+        (Some(low), Some(high)) => format!("lies between {low} and {high} Hz, where runs failed"),
+        _ => "no peak below 40 Hz".into(),
+    };
+    // A gap may hide the peak.
+    let (frequencies, amplitudes): (Vec<f64>, Vec<f64>) = response.iter().copied().unzip();
+    let peak = if lost.is_empty() { Mode::of_response(&frequencies, &amplitudes) } else { None };
+    let (ours, difference) = peak.map_or((none, String::new()), |peak| {
+        let beside = |published: f64| signed(100.0 * (peak.resonance_hz / published - 1.0), 0);
+        (
+            format!("{:.1} Hz, half-power width {:.1} Hz", peak.resonance_hz, peak.half_power_bandwidth_hz),
+            format!("{} % of 25 Hz, {} % of 23 Hz", beside(SIMULATED_HZ), beside(MEASURED_HZ)),
+        )
+    });
+    findings.compare(&format!("resonance, {chain}"), "25 Hz (simulated, m ≥ 3), 23 Hz (measured)", ours, difference, explanation);
 }
 
 pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {

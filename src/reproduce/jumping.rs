@@ -10,25 +10,25 @@ use crate::view::{Figure, Mark, fixed, shape, signed};
 
 /// The authors' own simulated curve, read off their published plot to ±0.03 mm.
 const ON_TIME: &str = include_str!("jump_height_vs_on_time.csv");
-/// The voltages of the real robot, and the gain that turns them into the code's.
+/// Voltages of the real robot, and the gain that converts them to those of the authors' code.
 const REAL: [&str; 2] = ["drive.on_voltages_v=[300,300,-1500,300,300]", "robot.positive_gain=1.733"];
 const PERIOD: f64 = 1.0 / 14.0;
-/// Measured height at 14 Hz (mm): "at least" the first, "as high as about" the second.
+/// Measured height at 14 Hz (mm): "at least" and "as high as about".
 const MEASURED: [f64; 2] = [7.5, 8.0];
-/// Spacing of the records of all runs and scans at these frequencies.
+/// Record interval of the runs at these frequencies.
 const RECORDS: &str = "simulation.record_every_s=5e-4";
-/// Frequencies (Hz) at which Bullet runs as well, and its time step there (s), which is the preset's.
+/// Frequencies (Hz) of the spot checks on Bullet, and their time step (s), the preset's.
 const SPOTS_HZ: [f64; 3] = [7.0, 14.0, 20.0];
 const SPOTS_STEP: f64 = 1e-5;
-/// ± of the authors' curve (mm), which was read off their plot.
+/// Reading error of the authors' plot (mm).
 const READ_OFF: f64 = 0.03;
-/// Bullet's step for the authors' curve (s): a hundred of the authors' own.
+/// Time step on Bullet for the authors' curve (s): a hundred of the authors' steps.
 const ON_TIME_STEP: f64 = 2e-3 / 240.0;
-/// Time between the authors' records (s): 12,500 of their steps. They do not say it; of all spacings this one puts Bullet's heights
-/// within the accuracy of reading on all of their points, where records without gaps would be up to 0.2 mm higher.
+/// The authors' record interval (s): 12,500 of their steps. It is not published; with it Bullet's heights agree with all of their points within
+/// the reading error.
 const ON_TIME_RECORDS: &str = "simulation.record_every_s=1.0416666666666667e-3";
 
-/// 1.2 s at 14 Hz, and its measures.
+/// A run of 1.2 s at 14 Hz with its measures.
 fn jump(bench: &Bench, bullet: bool) -> Result<(Experiment, Recording, Measures), StudyError> {
     let settings = [REAL[0], REAL[1], "simulation.duration_s=1.2", RECORDS];
     let (experiment, run) = if bullet {
@@ -39,8 +39,8 @@ fn jump(bench: &Bench, bullet: bool) -> Result<(Experiment, Recording, Measures)
     Ok((experiment, run.recording, run.measures))
 }
 
-/// The states of contact over the last two periods, one after the other, with their lengths (s). Those shorter than 2 ms are rebounds
-/// and belong to the one before.
+/// Sequence of contact states over the last two periods, with their durations (s). States shorter than 2 ms are rebounds and join the
+/// previous one.
 fn steps(recording: &Recording) -> Vec<(ContactState, f64)> {
     let end = recording.time[recording.len() - 1];
     let from = recording.time.partition_point(|&t| t < end - 2.0 * PERIOD).max(1);
@@ -53,12 +53,12 @@ fn steps(recording: &Recording) -> Vec<(ContactState, f64)> {
     let mut all: Vec<(ContactState, f64)> = Vec::new();
     samples.for_each(|(state, length)| join(&mut all, state, length, 0.0));
     let mut steps = Vec::new();
-    // Where the cut leaves less than that at the beginning, it is left out.
+    // A shorter state at the cut is left out.
     all.into_iter().skip_while(|step| step.1 < 2e-3).for_each(|(state, length)| join(&mut steps, state, length, 2e-3));
     steps
 }
 
-/// The measured height, in words.
+/// The quantity of the measured height, and its published value.
 const HEIGHT: &str = "height of the lowest point at 14 Hz";
 const HEIGHT_MEASURED: &str = "at least 7.5 mm, about 8 mm (measured)";
 
@@ -70,7 +70,7 @@ fn name(state: ContactState) -> &'static str {
     }
 }
 
-/// How far a height at 14 Hz is from the measured ones.
+/// Difference of a height at 14 Hz (mm) from the measured range, in words.
 fn beside_measured(height: f64) -> String {
     if (MEASURED[0]..=MEASURED[1]).contains(&height) {
         return "within".into();
@@ -122,7 +122,12 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
     if let Some(last) = findings.comparisons.last_mut() {
         last.bullet = list(&spot_recording);
     }
+    draw_jump(&mut findings, &recording);
+    Ok(findings)
+}
 
+/// Draws heights and voltage over the last four periods.
+fn draw_jump(findings: &mut Findings, recording: &Recording) {
     let end = recording.time[recording.len() - 1];
     let from = recording.time.partition_point(|&t| t < end - 4.0 * PERIOD);
     let mut figure = Figure::new("In-place jumping at 14 Hz", "time (ms)", "height z (mm)");
@@ -130,12 +135,11 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
     let node = |node: usize| {
         (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * recording.node(i, node)[2])).collect::<Vec<_>>()
     };
-    let lowest = |i: usize| (0..recording.nodes()).map(|n| recording.node(i, n)[2]).fold(f64::INFINITY, f64::min);
     figure.series("planar engine, midpoint", node(recording.nodes() / 2), Mark::Line);
     figure.series("planar engine, left end", node(0), Mark::Line);
     figure.series(
         "planar engine, lowest point",
-        (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * lowest(i))),
+        (from..recording.len()).map(|i| (1e3 * recording.time[i], 10.0 * lowest(recording, i))),
         Mark::Line,
     );
     let times = [1e3 * recording.time[from], 1e3 * end];
@@ -147,7 +151,6 @@ pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
     findings.caption = "The last four periods of 1.2 s. The robot repeats its motion after two periods of the voltage. The lines across are the \
                         measured height of the lowest point."
         .into();
-    Ok(findings)
 }
 
 pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
@@ -185,11 +188,12 @@ pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
     Ok(findings)
 }
 
+/// Height of the lowest node in a record (cm).
 fn lowest(recording: &Recording, i: usize) -> f64 {
     (0..recording.nodes()).map(|n| recording.node(i, n)[2]).fold(f64::INFINITY, f64::min)
 }
 
-/// Of each state of contact the record in the last two periods that shows it best: ends highest, middle highest, lowest point highest.
+/// For each contact state the record of the last two periods with the highest ends, middle and lowest point, respectively.
 fn best_moments(recording: &Recording) -> [(ContactState, Option<usize>); 3] {
     let states = contact_states(recording);
     let end = recording.time[recording.len() - 1];
@@ -212,8 +216,7 @@ pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
     let bullet = bench.spots("jump-frequency", &sweep, SPOTS_STEP, &SPOTS_HZ)?;
     let mut findings = Findings::default();
     findings.done_on(bench.effort, SPOTS_STEP);
-    let best =
-        heights.iter().copied().filter(|p| p.1.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((f64::NAN, f64::NAN));
+    let best = top(&heights);
     findings.compare(
         "frequency of the highest jump",
         "14 Hz (chosen for the measurements)",
@@ -243,6 +246,27 @@ pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
     Ok(findings)
 }
 
+/// The point of the largest finite y; NaN if there is none.
+fn top(points: &[(f64, f64)]) -> (f64, f64) {
+    points.iter().copied().filter(|p| p.1.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((f64::NAN, f64::NAN))
+}
+
+/// Compares the best on-times (s) and heights (mm): the authors', ours at their points, and ours on the finer grid.
+fn compare_tops(findings: &mut Findings, theirs: &[(f64, f64)], common: &[(f64, f64)], ours: &[(f64, f64)]) {
+    let [their_top, our_top, fine_top] = [theirs, common, ours].map(top);
+    findings.compare(
+        "best on-time on the authors' points",
+        &format!("{} ms, {} mm (authors' simulation)", fixed(1e3 * their_top.0, 0), fixed(their_top.1, 2)),
+        format!("{} ms, {} mm", fixed(1e3 * our_top.0, 0), fixed(our_top.1, 2)),
+        format!("{} ms, {} mm", signed(1e3 * (our_top.0 - their_top.0), 0), signed(our_top.1 - their_top.1, 2)),
+        &format!(
+            "On our finer grid the best is {} ms with {} mm; the authors have no point between 24 and 32 ms.",
+            fixed(1e3 * fine_top.0, 0),
+            fixed(fine_top.1, 2)
+        ),
+    );
+}
+
 pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
     let mut sweep = Sweep::open("preset:jump-on-time-scan".as_ref(), &[ON_TIME_RECORDS.into()])?;
     sweep.measures = vec!["recorded_jump_height_mm".into(), "jump_height_mm".into()];
@@ -264,11 +288,6 @@ pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
     };
     let common = beside(&ours);
     let worst = common.iter().copied().max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs())).unwrap_or_default();
-    let top = |points: &mut dyn Iterator<Item = (f64, f64)>| {
-        points.filter(|p| p.1.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((f64::NAN, f64::NAN))
-    };
-    let (their_top, our_top) = (top(&mut theirs.iter().copied()), top(&mut common.iter().map(|&(t, _, z)| (t, z))));
-    let fine_top = top(&mut ours.iter().copied());
     let mut findings = Findings::default();
     findings.done_on(bench.effort, ON_TIME_STEP);
     findings.compare(
@@ -288,17 +307,8 @@ pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
         "",
         "What is seen if every peak is caught.",
     );
-    findings.compare(
-        "best on-time on the authors' points",
-        &format!("{} ms, {} mm (authors' simulation)", fixed(1e3 * their_top.0, 0), fixed(their_top.1, 2)),
-        format!("{} ms, {} mm", fixed(1e3 * our_top.0, 0), fixed(our_top.1, 2)),
-        format!("{} ms, {} mm", signed(1e3 * (our_top.0 - their_top.0), 0), signed(our_top.1 - their_top.1, 2)),
-        &format!(
-            "On our finer grid the best is {} ms with {} mm; the authors have no point between 24 and 32 ms.",
-            fixed(1e3 * fine_top.0, 0),
-            fixed(fine_top.1, 2)
-        ),
-    );
+    let ours_at_theirs: Vec<(f64, f64)> = common.iter().map(|&(t, _, z)| (t, z)).collect();
+    compare_tops(&mut findings, &theirs, &ours_at_theirs, &ours);
     let ms = |points: &[(f64, f64)]| points.iter().map(|p| (1e3 * p.0, p.1)).collect::<Vec<_>>();
     let mut figure = Figure::new("A single jump against on-time", "on-time (ms)", "jump height (mm)");
     figure.setting("(520, 520, −1500, 520, 520) V, the middle three until the on-time").from_zero().size(WHOLE);

@@ -1,17 +1,17 @@
-//! All findings as one page, and as a table for documents.
+//! All findings as an HTML page and as a Markdown table.
 
 use std::fmt::Write;
 
-use super::{Comparison, Effort, Findings, Study};
+use super::{Comparison, Effort, Findings, Study, StudyError};
 use crate::view::escape;
 use crate::view::page::{Table, document, figure};
 
-/// Columns after the quantity: each number's engine stands over it.
+/// Columns of the table; those of numbers name the engine.
 const COLUMNS: [&str; 6] =
     ["quantity", "published", "ours (planar engine)", "difference", "spot check (Bullet)", "what explains it"];
 
-/// The findings as a self-contained HTML page. A study that failed stands there with its reason.
-pub fn page(effort: Effort, made_by: &str, results: &[(Study, Result<Findings, String>)]) -> String {
+/// The findings as a self-contained HTML page, with the reason of each failed study.
+pub fn page(effort: Effort, made_by: &str, results: &[(Study, Result<Findings, StudyError>)]) -> String {
     let title = "The paper's results, reproduced";
     let mut out = format!(
         "<h1>{title}</h1>\n<p>Zheng et al., “Scalable Simulation and Demonstration of Jumping Piezoelectric 2-D Soft Robots”, ICRA 2022, beside this \
@@ -34,7 +34,7 @@ pub fn page(effort: Effort, made_by: &str, results: &[(Study, Result<Findings, S
         );
         match result {
             Err(reason) => {
-                let _ = writeln!(out, "<p class=\"bad\"><strong>Not reproduced:</strong> {}</p>", escape(reason));
+                let _ = writeln!(out, "<p class=\"bad\"><strong>Not reproduced:</strong> {}</p>", escape(&reason.to_string()));
             }
             Ok(findings) => {
                 out.push_str(&figure(study.id, "", &findings.figure, &findings.caption));
@@ -56,7 +56,7 @@ fn cells(c: &Comparison) -> [&String; 6] {
 }
 
 /// All comparisons as one Markdown table.
-pub fn table(results: &[(Study, Result<Findings, String>)]) -> String {
+pub fn table(results: &[(Study, Result<Findings, StudyError>)]) -> String {
     let mut out = format!("| id | {} |\n|{}\n", COLUMNS.join(" | "), " --- |".repeat(COLUMNS.len() + 1));
     for (study, result) in results {
         match result {

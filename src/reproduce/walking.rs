@@ -4,8 +4,8 @@ use super::{Bench, Findings, Origin, StudyError, curve};
 use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, minus, shape, signed};
 
-/// The voltages of the real robot, the gain that turns them into the code's, and films of high friction under a smooth robot. The paper
-/// gives no coefficients; 0.2 and 4.0 are those of this program's defaults, not fitted to any result.
+/// Voltages of the real robot, the gain that converts them to those of the authors' code, and friction. The paper gives no coefficients of friction;
+/// these are the defaults of this program, not fitted to any result.
 const REAL: [&str; 4] = [
     "drive.on_voltages_v=[300,300,-1500,300,300]",
     "robot.positive_gain=1.733",
@@ -13,10 +13,10 @@ const REAL: [&str; 4] = [
     "robot.friction.high=4.0",
 ];
 
-/// Frequencies (Hz) at which Bullet runs as well, and its time step there (s).
+/// Frequencies (Hz) of the spot checks on Bullet, and their time step (s).
 const SPOTS_HZ: [f64; 5] = [2.0, 5.0, 8.0, 10.0, 14.0];
 const SPOTS_STEP: f64 = 1e-5;
-/// Measured travel in a cycle at 1 Hz (mm), and the frequency (Hz) up to which inchworm motion was seen.
+/// Measured travel per cycle at 1 Hz (mm), and highest frequency with inchworm motion (Hz).
 const STRIDE: f64 = 1.9;
 const FORWARD_TO_HZ: i32 = 3;
 /// Measured speeds: frequency (Hz), speed (mm/s).
@@ -78,7 +78,7 @@ pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     figure.setting("1 Hz, (300, 300, −1500, 300, 300) V, friction 0.2 and 4.0").size(WHOLE);
     let x = |i: usize, node: usize| 10.0 * r.node(i, node)[0];
     let ends = [0, r.nodes() - 1];
-    // All from where the robot's ends are in the mean at the beginning of the second cycle, as the first begins from rest.
+    // Travel from the start of the second cycle, because the first begins at rest.
     let from = r.time.partition_point(|&t| t < 1.0 - 1e-9).min(r.len() - 1);
     let travel = |node: usize| (0..r.len()).map(move |i| (r.time[i], x(i, node) - x(from, node))).collect::<Vec<_>>();
     let [left, right] = ends.map(travel);

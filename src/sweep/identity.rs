@@ -1,4 +1,4 @@
-//! Whose rows a folder holds: what decides the results, in `sweep.json` beside them.
+//! The identity of a sweep, all that determines its results, in `sweep.json` beside its rows.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{RowError, Sweep};
 use crate::files::Pending;
 
-/// The program that computes: results may change with its revision, and with Bullet's.
+/// This program: results may change with its revision and with Bullet's version.
 const PROGRAM: &str = concat!(
     "sfers ",
     env!("CARGO_PKG_VERSION"),
@@ -19,11 +19,11 @@ const PROGRAM: &str = concat!(
     env!("SFERS_BULLET_PRECISION")
 );
 
-/// The key of the list of programs, which alone may grow.
+/// Key of the list of programs, the only part of an identity that may grow.
 const PROGRAMS: &str = "programs";
 
 impl Sweep {
-    /// Everything that decides the results: two sweeps with the same identity give the same rows.
+    /// All that determines the results: sweeps of equal identity have equal rows.
     pub fn identity(&self) -> Value {
         let axes: Vec<_> = self.axes.iter().map(|axis| json!({"key": axis.key, "values": axis.values})).collect();
         let settings: Vec<_> = self.source.settings().iter().map(|setting| json!([setting.key, setting.value])).collect();
@@ -38,14 +38,14 @@ impl Sweep {
         })
     }
 
-    /// Leaves the identity in the folder, or checks that it is there already.
+    /// Writes the identity to the folder, or checks the one there.
     ///
     /// # Errors
-    /// [`RowError::Foreign`] with what differs; [`RowError::OtherProgram`] if only the program does.
+    /// [`RowError::Foreign`] with the differences; [`RowError::OtherProgram`] if only the program differs.
     pub(super) fn claim(&self, folder: &Path) -> Result<(), RowError> {
         let path = path(folder);
         let Some(found) = read(&path)? else {
-            // Two shards may start together: whoever comes second writes the same text.
+            // Shards that start together write the same text.
             return write(&path, &self.identity());
         };
         self.compare(&path, &found)?;
@@ -57,7 +57,7 @@ impl Sweep {
         Err(RowError::OtherProgram { path, theirs: theirs.join(" and "), ours: PROGRAM.into() })
     }
 
-    /// Checks all but the program.
+    /// Compares all but the program.
     fn compare(&self, path: &Path, found: &Value) -> Result<(), RowError> {
         let differences = differences(found, &self.identity());
         if differences.is_empty() {
@@ -71,7 +71,7 @@ impl Sweep {
     }
 }
 
-/// Adds this program to those whose rows the folder may hold, so that a sweep begun by another revision goes on.
+/// Adds this program to the identity in the folder, so that a sweep of another revision can continue.
 ///
 /// # Errors
 /// [`RowError`] if the folder holds another sweep's rows, or its identity cannot be written.
@@ -108,10 +108,10 @@ fn write(path: &Path, identity: &Value) -> Result<(), RowError> {
         .map_err(|error| RowError::Io { path: path.into(), reason: error.to_string() })
 }
 
-/// What differs between two identities but the programs, in words.
+/// The differences of two identities except for the programs, in words.
 fn differences(found: &Value, ours: &Value) -> Vec<String> {
     if found["schema"] != ours["schema"] {
-        return vec!["their layouts (it was begun by another version of the program)".into()];
+        return vec!["their layouts (it is of another version of the program)".into()];
     }
     let mut list = Vec::new();
     for (key, words) in [("experiment", "the experiment files"), ("settings", "the settings"), ("measures", "the measures")] {
@@ -135,7 +135,7 @@ fn differences(found: &Value, ours: &Value) -> Vec<String> {
     list
 }
 
-/// Names that only one of two lists has, or both with other values.
+/// Names with different values in two lists, or missing in one.
 fn unequal(a: &[(String, Value)], b: &[(String, Value)]) -> Vec<String> {
     let names = a.iter().chain(b.iter().filter(|(name, _)| !a.iter().any(|(other, _)| other == name))).map(|(name, _)| name);
     let value =

@@ -10,7 +10,7 @@
 //! "robot.damping_eta" = { from = 0.008, to = 0.108, count = 5 }
 //! ```
 //!
-//! The runs are those of the planar engine unless the experiment names the other one.
+//! Runs are on the planar engine unless the experiment names an engine.
 
 mod identity;
 mod rows;
@@ -31,22 +31,22 @@ use crate::files;
 use crate::recording::definitions;
 use crate::words;
 
-/// Largest number of points of a grid: all are checked before the first runs, at about 25 µs each.
+/// Largest number of points of a grid: all are checked before the first run, in about 25 µs each.
 const MAX_POINTS: usize = 500_000;
 
-/// One key and the values that it takes.
+/// A varied key with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Key of the experiment file, with dots.
     pub key: String,
     /// Its values, in order.
     pub values: Vec<Value>,
-    /// Where they were given, for messages.
+    /// File and line of the values, for messages.
     pub place: String,
 }
 
 impl Axis {
-    /// Whether a setting of `key` would change the same values, as would one of a table that holds them.
+    /// True if a setting of `key`, or of a table that contains it, would change these values.
     fn overlaps(&self, key: &str) -> bool {
         let inside = |inner: &str, outer: &str| inner.strip_prefix(outer).is_some_and(|rest| rest.starts_with('.'));
         self.key == key || inside(&self.key, key) || inside(key, &self.key)
@@ -60,13 +60,13 @@ pub struct Sweep {
     pub source: Source,
     /// Names of the measures wanted.
     pub measures: Vec<String>,
-    /// What is varied; the last axis runs fastest.
+    /// The varied keys; the last runs fastest.
     pub axes: Vec<Axis>,
-    /// The files that the experiments refer to, as they are written there, with a digest of their content.
+    /// Paths of the files that the experiments refer to, as written there, with a digest of their content.
     files: BTreeMap<String, String>,
 }
 
-/// The file as written.
+/// A sweep file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct File {
@@ -85,10 +85,10 @@ pub(crate) struct Range {
 }
 
 impl Sweep {
-    /// Reads a sweep from its text. `name` is for messages, `folder` where the experiment's path starts. Every point is checked.
+    /// Parses a sweep and checks every point. `name` is for messages; the experiment's path is relative to `folder`.
     ///
     /// # Errors
-    /// [`ConfigError`] for anything that is not a sweep: unknown keys or measures, an empty range, a point that makes no experiment.
+    /// [`ConfigError`] for unknown keys or measures, an empty range, or a point that is not a valid experiment.
     pub fn from_text(name: &str, text: &str, folder: &Path) -> Result<Self, ConfigError> {
         Self::with_settings(name, text, folder, &[])
     }
@@ -96,56 +96,19 @@ impl Sweep {
     fn with_settings(name: &str, text: &str, folder: &Path, settings: &[String]) -> Result<Self, ConfigError> {
         let file: File = toml::from_str(text)
             .map_err(|error| ConfigError::Syntax { source_name: name.into(), message: words::toml_error(&error) })?;
-        let place = |key: &[&str]| {
-            line_of(text, key.iter().copied()).map_or_else(|| name.to_owned(), |line| format!("{name}, line {line}"))
-        };
-        let fault = |key: &str, message: String| ConfigError::Value { place: place(&[key]), key: key.into(), message };
+        let document = Document { name, text };
         let mut source = match file.experiment.strip_prefix("preset:") {
             Some(preset) => {
-                let text = presets::text_of(preset).ok_or_else(|| fault("experiment", presets::unknown(preset)))?;
-                Source::from_text(preset, text)
+                let unknown = || document.fault("experiment", presets::unknown(preset));
+                Source::from_text(preset, presets::text_of(preset).ok_or_else(unknown)?)
             }
             None => Source::from_file(&folder.join(&file.experiment))?,
         };
-        if file.measures.is_empty() {
-            return Err(fault("measures", format!("is empty; choose from {}", definitions::names().join(", "))));
-        }
-        for (i, measure) in file.measures.iter().enumerate() {
-            if !definitions::names().contains(&measure.as_str()) {
-                return Err(fault("measures", words::not_one_of(measure, &definitions::names())));
-            }
-            if file.measures[..i].contains(measure) {
-                return Err(fault("measures", format!("{measure} stands there twice")));
-            }
-        }
-        let mut axes = Vec::new();
-        for (key, values) in file.vary {
-            let place = place(&["vary", &key]);
-            let values = axis(&values).map_err(|message| ConfigError::Value {
-                place: place.clone(),
-                key: format!("vary.\"{key}\""),
-                message,
-            })?;
-            axes.push(Axis { key, values, place });
-            if points(&axes).is_none() {
-                return Err(fault("vary", format!("must give between 1 and {MAX_POINTS} points")));
-            }
-        }
+        document.check_measures(&file.measures)?;
+        let mut axes = document.axes(file.vary)?;
         for setting in settings {
-            let setting = Setting::parse(setting)?;
-            match axes.iter_mut().find(|axis| axis.overlaps(&setting.key)) {
-                None => source.push(setting),
-                // A key with one value is not varied: it holds a value for all points, which may be another.
-                Some(axis) if axis.values.len() == 1 && axis.key == setting.key => {
-                    (axis.values, axis.place) = (vec![setting.toml()], setting.place);
-                }
-                Some(axis) => {
-                    let message = format!("the sweep varies {} ({}); change its values there", axis.key, axis.place);
-                    return Err(ConfigError::Value { place: setting.place, key: setting.key, message });
-                }
-            }
+            apply(Setting::parse(setting)?, &mut source, &mut axes)?;
         }
-        // Sweeps are what the fast engine is for.
         if source.parse()?.simulation.engine.is_none() {
             source.push(Setting {
                 key: "simulation.engine".into(),
@@ -154,7 +117,7 @@ impl Sweep {
             });
         }
         if axes.is_empty() {
-            return Err(fault("vary", format!("must give between 1 and {MAX_POINTS} points")));
+            return Err(document.wrong_size());
         }
         let mut sweep = Self { source, measures: file.measures, axes, files: BTreeMap::new() };
         for index in 0..sweep.len() {
@@ -176,7 +139,7 @@ impl Sweep {
         }
     }
 
-    /// The first of an experiment's files that is not what it was when the sweep was read; without an experiment, of all files.
+    /// The first file of an experiment, or of all experiments, whose content changed since the sweep was read.
     fn changed(&self, experiment: Option<&Experiment>) -> Option<PathBuf> {
         let as_before = |file: &Path| self.files.get(&file.display().to_string()) == self.digest(file).ok().as_ref();
         let changed = match experiment {
@@ -213,7 +176,7 @@ impl Sweep {
         self.axes.iter().map(|axis| axis.values.len()).product()
     }
 
-    /// Whether there is no point; never so for a sweep that was read.
+    /// True if there is no point, which no sweep from a file has.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -238,7 +201,7 @@ impl Sweep {
     /// The experiment of a point.
     ///
     /// # Errors
-    /// [`ConfigError`] that names the key and value at fault.
+    /// [`ConfigError`] with the key and its value, if the point is not a valid experiment.
     pub fn experiment(&self, index: usize) -> Result<Experiment, ConfigError> {
         experiment::experiment(&self.source_of(index)?)
     }
@@ -261,6 +224,78 @@ impl Sweep {
         let keys = self.axes.iter().map(|axis| axis.key.as_str());
         keys.chain(self.measures.iter().map(String::as_str)).chain(["status"]).collect()
     }
+}
+
+/// The text of a sweep file with its name, for messages.
+struct Document<'a> {
+    name: &'a str,
+    text: &'a str,
+}
+
+impl Document<'_> {
+    /// Name and line of a key.
+    fn place(&self, key: &[&str]) -> String {
+        let name = self.name;
+        line_of(self.text, key.iter().copied()).map_or_else(|| name.to_owned(), |line| format!("{name}, line {line}"))
+    }
+
+    fn fault(&self, key: &str, message: String) -> ConfigError {
+        ConfigError::Value { place: self.place(&[key]), key: key.into(), message }
+    }
+
+    /// The error of a grid without points or with too many.
+    fn wrong_size(&self) -> ConfigError {
+        self.fault("vary", format!("must give between 1 and {MAX_POINTS} points"))
+    }
+
+    fn check_measures(&self, measures: &[String]) -> Result<(), ConfigError> {
+        let names = definitions::names();
+        if measures.is_empty() {
+            return Err(self.fault("measures", format!("is empty; choose from {}", names.join(", "))));
+        }
+        for (i, measure) in measures.iter().enumerate() {
+            if !names.contains(&measure.as_str()) {
+                return Err(self.fault("measures", words::not_one_of(measure, &names)));
+            }
+            if measures[..i].contains(measure) {
+                return Err(self.fault("measures", format!("{measure} is listed twice")));
+            }
+        }
+        Ok(())
+    }
+
+    /// The axes of `[vary]`.
+    fn axes(&self, vary: Table) -> Result<Vec<Axis>, ConfigError> {
+        let mut axes = Vec::new();
+        for (key, values) in vary {
+            let place = self.place(&["vary", &key]);
+            let values = axis(&values).map_err(|message| ConfigError::Value {
+                place: place.clone(),
+                key: format!("vary.\"{key}\""),
+                message,
+            })?;
+            axes.push(Axis { key, values, place });
+            if points(&axes).is_none() {
+                return Err(self.wrong_size());
+            }
+        }
+        Ok(axes)
+    }
+}
+
+/// Applies a setting to the experiment, or to the axis of its key if that has a single value.
+fn apply(setting: Setting, source: &mut Source, axes: &mut [Axis]) -> Result<(), ConfigError> {
+    match axes.iter_mut().find(|axis| axis.overlaps(&setting.key)) {
+        None => source.push(setting),
+        Some(axis) if axis.values.len() == 1 && axis.key == setting.key => {
+            (axis.values, axis.place) = (vec![setting.toml()], setting.place);
+        }
+        Some(axis) => {
+            let message = format!("the sweep varies {} ({}); change its values there", axis.key, axis.place);
+            return Err(ConfigError::Value { place: setting.place, key: setting.key, message });
+        }
+    }
+    Ok(())
 }
 
 /// Number of points of a grid; `None` if there are too many.

@@ -1,7 +1,7 @@
-//! Finished rows on disk: one file per shard that only grows, so that a kill loses nothing but the points being computed.
+//! Finished rows on disk: one append-only file per shard, so that a killed process loses only the points in work.
 //!
-//! Each row is written by one call, with its index in front and a line end behind. A line without its end was cut off by a kill or a full
-//! disk: it is taken away and its point computed again.
+//! One call writes one row, its index first and a line end last. A line without its end was cut off by a kill or a full disk; it is removed and
+//! its point computed again.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -16,11 +16,11 @@ use crate::files::{self, Pending};
 /// One finished point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Which point of the grid.
+    /// Index of the point in the grid.
     pub index: usize,
     /// The measures, in the sweep's order.
     pub measures: Vec<Option<f64>>,
-    /// `ok`, or why there are no measures.
+    /// `ok`, or the reason for missing measures.
     pub status: String,
 }
 
@@ -28,20 +28,20 @@ pub struct Row {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RowError {
-    /// The folder holds another sweep's results, or rows that are not of this sweep.
+    /// The folder holds results of another sweep, or a file that is not one of rows.
     #[error("{}: {reason}", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What does not fit.
+        /// The difference.
         reason: String,
     },
-    /// Another program computed the rows: another revision, or with another Bullet.
-    #[error("{}: its rows were computed by {theirs}, and this is {ours}; go on with that program, or choose another --out", path.display())]
+    /// Another revision of the program, or one with another Bullet, computed the rows.
+    #[error("{}: its rows were computed by {theirs}, and this is {ours}; continue with that program, or choose another --out", path.display())]
     OtherProgram {
-        /// The file that says so.
+        /// The file with the identity.
         path: PathBuf,
-        /// Who computed them.
+        /// The programs that computed the rows.
         theirs: String,
         /// This program.
         ours: String,
@@ -54,18 +54,18 @@ pub enum RowError {
         /// Why.
         reason: String,
     },
-    /// Not all points are there.
+    /// Points are missing.
     #[error(
         "{missing} of {points} points are missing, the first of them point {first} ({values}); run the shards that hold them"
     )]
     Incomplete {
-        /// How many.
+        /// Number of missing points.
         missing: usize,
-        /// Of how many.
+        /// Number of points of the sweep.
         points: usize,
-        /// Index of the first.
+        /// Index of the first missing point.
         first: usize,
-        /// Its values.
+        /// Keys and values of that point.
         values: String,
     },
 }
@@ -74,7 +74,7 @@ fn io(path: &Path) -> impl Fn(std::io::Error) -> RowError + '_ {
     move |error| RowError::Io { path: path.into(), reason: error.to_string() }
 }
 
-/// The rows of one shard, open for more.
+/// The rows of one shard, open for appending.
 #[derive(Debug)]
 pub struct Rows {
     path: PathBuf,
@@ -84,11 +84,11 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Opens the rows of shard `shard` (from 1) of `shards` in `folder`, which is made if need be, and checks that the folder is this
-    /// sweep's. The file is locked until the rows are dropped, where the file system can do that.
+    /// Opens the rows of shard `shard` (from 1) of `shards` in `folder`, creates both if missing, and checks that the folder belongs to this sweep. The
+    /// file is locked until the rows are dropped, if the file system has locks.
     ///
     /// # Errors
-    /// [`RowError`].
+    /// [`RowError`] if the folder is another sweep's, another process works on the shard, or the file cannot be read.
     pub fn open(folder: &Path, sweep: &Sweep, shard: usize, shards: usize) -> Result<Self, RowError> {
         Self::open_with(folder, sweep, shard, shards, File::try_lock)
     }
@@ -110,7 +110,7 @@ impl Rows {
         let unlocked = match lock(&file) {
             Ok(()) => None,
             Err(TryLockError::WouldBlock) => {
-                let reason = "another sfers is working on it; wait for it, or give every process a shard of its own".into();
+                let reason = "another sfers is working on it; wait for it, or give each process its own shard".into();
                 return Err(RowError::Io { path, reason });
             }
             Err(TryLockError::Error(error)) if files::cannot_lock(&error) => Some(format!(
@@ -121,7 +121,7 @@ impl Rows {
         };
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(io(&path))?;
-        let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
+        let whole = whole_lines(&bytes).len();
         if whole < bytes.len() {
             file.set_len(whole as u64).map_err(io(&path))?;
             file.seek(SeekFrom::End(0)).map_err(io(&path))?;
@@ -130,30 +130,29 @@ impl Rows {
         Ok(Self { path, file, done, unlocked })
     }
 
-    /// A warning if the file system cannot keep other processes from the same rows.
+    /// A warning if the file system has no locks.
     pub fn unlocked(&self) -> Option<&str> {
         self.unlocked.as_deref()
     }
 
-    /// The rows that are there.
+    /// The finished rows by index.
     pub fn done(&self) -> &BTreeMap<usize, Row> {
         &self.done
     }
 
-    /// Adds a row, on disk as soon as this returns to the extent that a kill of the process cannot undo it.
+    /// Appends a row; a kill of the process cannot undo it.
     ///
     /// # Errors
-    /// [`RowError::Io`]; the rows before stay intact.
+    /// [`RowError::Io`] if the row cannot be written; earlier rows are unchanged.
     pub fn append(&mut self, row: Row) -> Result<(), RowError> {
         let mut line = csv::Writer::from_writer(Vec::new());
-        let measures = row.measures.iter().map(|m| m.map_or_else(String::new, |m| format!("{m:?}")));
-        let fields = std::iter::once(row.index.to_string()).chain(measures).chain([row.status.clone()]);
+        let fields = std::iter::once(row.index.to_string()).chain(cells(&row)).chain([row.status.clone()]);
         let io_of_csv = |error: csv::Error| RowError::Io { path: self.path.clone(), reason: error.to_string() };
         line.write_record(fields).map_err(io_of_csv)?;
         let line = line.into_inner().map_err(|error| RowError::Io { path: self.path.clone(), reason: error.to_string() })?;
         let before = self.file.metadata().map_err(io(&self.path))?.len();
         if let Err(error) = self.file.write_all(&line) {
-            // What was written of it would end the file in the middle of a line.
+            // Removes a partial line.
             let _ = self.file.set_len(before);
             return Err(io(&self.path)(error));
         }
@@ -166,9 +165,19 @@ fn replace(path: &Path, bytes: &[u8]) -> Result<(), RowError> {
     Pending::open(path).and_then(|pending| pending.finish(bytes)).map_err(io(path))
 }
 
-/// A value as a cell: words without the quotes that TOML needs.
+/// A value as a cell: texts without the quotes of TOML.
 fn plain(value: &toml::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// The measures as cells; empty for missing ones.
+fn cells(row: &Row) -> impl Iterator<Item = String> + '_ {
+    row.measures.iter().map(|m| m.map_or_else(String::new, |m| format!("{m:?}")))
+}
+
+/// The bytes up to the last line end.
+fn whole_lines(bytes: &[u8]) -> &[u8] {
+    &bytes[..bytes.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1)]
 }
 
 fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row>, RowError> {
@@ -179,7 +188,7 @@ fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row
         let line = line + 1;
         let record = record.map_err(|error| foreign(line, &error.to_string()))?;
         if record.len() != sweep.measures.len() + 2 {
-            return Err(foreign(line, "has not the fields of a row of this sweep"));
+            return Err(foreign(line, "does not have the fields of a row of this sweep"));
         }
         let index = record[0].parse().ok().filter(|&index: &usize| index < sweep.len());
         let index = index.ok_or_else(|| foreign(line, "does not begin with the index of a point"))?;
@@ -193,10 +202,10 @@ fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row
     Ok(rows)
 }
 
-/// Gathers the rows of all shards in `folder` and writes `results.csv`, in the grid's order.
+/// Collects the rows of all shards in `folder` and writes `results.csv` in the grid's order.
 ///
 /// # Errors
-/// [`RowError::Incomplete`] if a point is in no shard; nothing is written then.
+/// [`RowError::Incomplete`] if a point is in no shard, when nothing is written; other [`RowError`]s if a file cannot be read or written.
 pub fn merge(folder: &Path, sweep: &Sweep) -> Result<PathBuf, RowError> {
     sweep.claim(folder)?;
     let mut all = BTreeMap::new();
@@ -205,8 +214,7 @@ pub fn merge(folder: &Path, sweep: &Sweep) -> Result<PathBuf, RowError> {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         if name.starts_with("rows-") && name.ends_with(".csv") {
             let bytes = files::read(&path).map_err(io(&path))?;
-            let whole = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
-            all.append(&mut parse(&path, &bytes[..whole], sweep)?);
+            all.append(&mut parse(&path, whole_lines(&bytes), sweep)?);
         }
     }
     if all.len() < sweep.len() {
@@ -225,8 +233,7 @@ pub fn merge(folder: &Path, sweep: &Sweep) -> Result<PathBuf, RowError> {
     writer.write_record(sweep.header()).map_err(io_of_csv)?;
     for row in all.values() {
         let values = sweep.point(row.index).into_iter().map(plain);
-        let measures = row.measures.iter().map(|m| m.map_or_else(String::new, |m| format!("{m:?}")));
-        writer.write_record(values.chain(measures).chain([row.status.clone()])).map_err(io_of_csv)?;
+        writer.write_record(values.chain(cells(row)).chain([row.status.clone()])).map_err(io_of_csv)?;
     }
     let bytes = writer.into_inner().map_err(|error| RowError::Io { path: path.clone(), reason: error.to_string() })?;
     replace(&path, &bytes)?;

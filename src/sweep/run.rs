@@ -1,4 +1,4 @@
-//! Computing the points that are not there yet.
+//! Computation of the missing points of a sweep.
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -9,25 +9,25 @@ use rayon::prelude::*;
 use super::{Row, RowError, Rows, Sweep};
 use crate::experiment::{self, Control, Run};
 
-/// What a sweep has done.
+/// Counts of a sweep's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Outcome {
-    /// Points that were there before.
+    /// Points computed by earlier runs.
     pub before: usize,
-    /// Points computed now.
+    /// Points computed by this run.
     pub computed: usize,
     /// Points of this shard whose status is not `ok`.
     pub failed: usize,
-    /// Whether `stop` ended it early.
+    /// True if `stop` ended the sweep early.
     pub interrupted: bool,
 }
 
-/// Computes the missing points of shard `shard` (from 1) of `shards`, on `jobs` threads. Every row is on disk before the next begins on
-/// that thread. `progress` is called with the number of points done and of all points of the shard; when `stop` turns true, points in
-/// work are given up. `warn` gets what the user should know before the work begins.
+/// Computes the missing points of shard `shard` (from 1) of `shards` on `jobs` threads. A thread writes its row before it starts the next point.
+/// `progress` gets the numbers of finished points and of all points of the shard; `stop` abandons the points in work; `warn` gets warnings
+/// before the first point.
 ///
 /// # Errors
-/// [`RowError`] if the rows cannot be read or written. A point that fails is a row.
+/// [`RowError`] if the rows cannot be read or written. A failed point is a row with its reason.
 pub fn run(
     sweep: &Sweep,
     folder: &Path,
@@ -79,7 +79,10 @@ pub fn run(
     })
 }
 
-/// Runs one point; `None` if it was given up. The error is a file that was changed since the sweep was read.
+/// Runs one point; `None` if it was abandoned.
+///
+/// # Errors
+/// The path of a file that changed since the sweep was read.
 fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Result<Option<Row>, PathBuf> {
     let experiment = sweep.experiment(index);
     if let Some(path) = sweep.changed(experiment.as_ref().ok()) {

@@ -1,6 +1,6 @@
-//! Axes: ranges of values laid over ranges of the page, and their ticks.
+//! Axes: maps from values to the page, and ticks.
 
-/// One axis: a range of values laid over a range of the page (pt).
+/// An axis: a linear map from a range of values to a range of the page (pt).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scale {
     pub low: f64,
@@ -10,7 +10,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// The range of the values, widened by `margin` of it, or around a single value.
+    /// The range of the values, extended by the share `margin` at both ends, or around a single value.
     pub fn over(values: impl Iterator<Item = f64>, margin: f64) -> Self {
         let (mut low, mut high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if low > high {
@@ -21,7 +21,7 @@ impl Scale {
         Self { low: low - pad, high: high + pad, from: 0.0, to: 1.0 }
     }
 
-    /// Widens to `range`, upwards if the lower end is to stay, else about the middle.
+    /// Widens to `range`, upwards if `keep_low`, otherwise about the middle.
     pub fn widen(&mut self, range: f64, keep_low: bool) {
         let low = if keep_low { self.low } else { 0.5 * (self.low + self.high - range) };
         (self.low, self.high) = (low, low + range);
@@ -39,16 +39,16 @@ impl Scale {
         self.high - self.low
     }
 
-    /// About `count` round values, and the digits after the point that they need.
+    /// About `count` round values, and their digits after the point.
     pub fn ticks(&self, count: usize) -> (Vec<f64>, usize) {
         ticks(self.low, self.high, count)
     }
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten within a range, at most `count` of them, and the digits after the point that they need.
+/// At most about `count` multiples of 1, 2 or 5 times a power of ten within a range, and their digits after the point.
 pub(super) fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
     let rough = (high - low) / count as f64;
-    // Powers of ten below have no digits to be multiples of.
+    // Smaller steps underflow.
     if rough < 1e-290 {
         return (vec![low], 0);
     }

@@ -1,27 +1,27 @@
-//! The page of a figure: its physical size and the text and boxes on it.
+//! The page of a figure: its size, texts, lines and boxes.
 
 use std::fmt::Write;
 
 use super::text::{FAMILY, escape, minus_signs, shorten};
 
-/// Points (1/72 inch) in a millimetre. A figure counts in points: a font size of 8 is 8 pt on paper.
+/// Points (1/72 inch) per millimetre. The unit of a figure is the point.
 pub(super) const PT_PER_MM: f64 = 72.0 / 25.4;
 
-/// Physical size of a figure: its width and the size of its letters; the height follows from what it shows.
+/// Physical size of a figure: width and font size; the height follows from the contents.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Size {
     /// Width (mm).
     pub width_mm: f64,
-    /// Size of all letters but the title's (pt).
+    /// Font size of all texts but the title (pt).
     pub font_pt: f64,
 }
 
 impl Size {
-    /// One column of a journal: 85 mm, letters of 8 pt.
+    /// One column of a journal: 85 mm, 8 pt.
     pub const SINGLE: Self = Self { width_mm: 85.0, font_pt: 8.0 };
-    /// Two columns of a journal: 175 mm, letters of 8 pt.
+    /// Two columns of a journal: 175 mm, 8 pt.
     pub const DOUBLE: Self = Self { width_mm: 175.0, font_pt: 8.0 };
-    /// A page on a screen: 170 mm (643 CSS px), letters of 9.5 pt.
+    /// A page on a screen: 170 mm (643 CSS px), 9.5 pt.
     pub const SCREEN: Self = Self { width_mm: 170.0, font_pt: 9.5 };
 
     /// Width (pt).
@@ -30,7 +30,7 @@ impl Size {
     }
 }
 
-/// Where a text begins: at its left end, its middle or its right end.
+/// The part of a text at its position: left end, middle or right end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -48,14 +48,14 @@ impl Anchor {
     }
 }
 
-/// An SVG that is being written; its unit is the point.
+/// A buffer for an SVG; its unit is the point.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     pub out: String,
 }
 
 impl Canvas {
-    /// Text whose middle line is at `y`.
+    /// Adds a text with its middle line at `y`.
     pub fn text(&mut self, x: f64, y: f64, size: f64, anchor: Anchor, text: &str) {
         let _ = writeln!(
             self.out,
@@ -66,7 +66,7 @@ impl Canvas {
         );
     }
 
-    /// Text on data, with a white rim.
+    /// Adds a text with a white outline, for texts on data.
     pub fn note(&mut self, x: f64, y: f64, size: f64, text: &str) {
         let _ = writeln!(
             self.out,
@@ -76,7 +76,7 @@ impl Canvas {
         );
     }
 
-    /// Text from below upwards, centred on `(x, y)`.
+    /// Adds a text turned by 90°, centred on `(x, y)`.
     pub fn upright(&mut self, x: f64, y: f64, size: f64, text: &str) {
         let _ = writeln!(
             self.out,
@@ -94,7 +94,7 @@ impl Canvas {
         );
     }
 
-    /// The box of a pair of axes.
+    /// Adds the frame of a pair of axes.
     pub fn frame(&mut self, area: Area) {
         let _ = writeln!(
             self.out,
@@ -106,7 +106,7 @@ impl Canvas {
         );
     }
 
-    /// The floor: a line with hatching below it.
+    /// Adds the floor: a line with hatching below it.
     pub fn floor(&mut self, left: f64, right: f64, y: f64) {
         self.out.push_str(r#"<g class="floor">"#);
         self.line((left, y), (right, y), "#111", 0.9);
@@ -119,7 +119,7 @@ impl Canvas {
         let _ = writeln!(self.out, r##"<path d="{path}" fill="none" stroke="#111" stroke-width="0.5"/></g>"##);
     }
 
-    /// The whole document, `height` points high.
+    /// The SVG document of a given height (pt).
     pub fn document(self, size: Size, height: f64, title: &str) -> String {
         let width = size.width();
         let mm = height / PT_PER_MM;
@@ -135,8 +135,9 @@ impl Canvas {
     }
 }
 
-/// Length and distance of the lines of a hatching (pt).
+/// Length of the hatch lines (pt).
 pub(super) const HATCH: f64 = 3.0;
+/// Distance of the hatch lines (pt).
 const HATCH_STEP: f64 = 4.0;
 
 /// A rectangle on the page (pt).

@@ -1,10 +1,10 @@
-//! A recording as an animated GIF: every frame is drawn as SVG, with time, scale bar, voltages and their colours.
+//! Animated GIFs of recordings: each frame is an SVG with time, scale bar, voltages and their colour bar.
 
 use std::fmt::Write;
 
 use super::axis::ticks;
 use super::canvas::{Anchor, Canvas, Size};
-use super::image::pixels;
+use super::image::{ImageError, pixels};
 use super::player::{on_ground, voltages};
 use super::text::{number, significant, width};
 use crate::model::units::mm_from_cm;
@@ -12,27 +12,27 @@ use crate::recording::Recording;
 
 /// Frames per second; GIF counts in hundredths of a second.
 const FRAMES_PER_S: f64 = 25.0;
-/// Frames of a GIF at most.
+/// Largest number of frames of a GIF.
 const FRAMES: usize = 1000;
-/// Pixels per inch; the picture is 640 pixels wide.
+/// Resolution (dots per inch); the image is 640 pixels wide.
 const DPI: f64 = 96.0;
 const PAGE: Size = Size { width_mm: 640.0 / 96.0 * 25.4, font_pt: 9.0 };
 /// Thickness of the robot (pt).
 const ROBOT: f64 = 6.0;
-/// Height of what stands above and below the robot (pt).
+/// Heights of the parts above and below the robot (pt).
 const HEAD: f64 = 30.0;
 const FOOT: f64 = 50.0;
 
-/// Draws the recording at `speed` (1: real time; by default, some seconds long) and encodes it, repeating for ever.
+/// Encodes the recording as a GIF in an endless loop, at `speed` (1: real time; by default a duration of six seconds).
 ///
 /// # Errors
-/// What the encoder reports, in words.
-pub fn gif(recording: &Recording, speed: Option<f64>) -> Result<Vec<u8>, String> {
+/// [`ImageError`] if a frame cannot be drawn or encoded.
+pub fn gif(recording: &Recording, speed: Option<f64>) -> Result<Vec<u8>, ImageError> {
     let duration = recording.time.last().copied().unwrap_or(0.0);
     let speed = speed.unwrap_or(duration / 6.0).max(1e-6);
     let count = ((duration / speed * FRAMES_PER_S).ceil() as usize).clamp(1, FRAMES);
     let scene = Scene::of(recording);
-    let failed = |error: gif::EncodingError| error.to_string();
+    let failed = |error: gif::EncodingError| ImageError::Encoder(error.to_string());
     let first = pixels(&scene.svg(recording, 0), DPI)?;
     let (across, high) = (first.width() as u16, first.height() as u16);
     let mut out = Vec::new();
@@ -50,13 +50,14 @@ pub fn gif(recording: &Recording, speed: Option<f64>) -> Result<Vec<u8>, String>
     Ok(out)
 }
 
-/// What part of the plane is shown, and how large.
+/// The visible part of the plane and its scale.
 struct Scene {
+    /// Left and lower edge of the plane (mm).
     left: f64,
     bottom: f64,
-    /// Points of the page per mm of the robot.
+    /// Scale (pt/mm).
     scale: f64,
-    /// Height of the page (pt), and where the lower edge of the plane lies on it.
+    /// Height of the page, and position of the plane's lower edge on it (pt).
     height: f64,
     floor: f64,
     lowest_voltage: f64,
@@ -89,7 +90,7 @@ impl Scene {
         }
     }
 
-    /// Where a point is drawn: z is the height of the robot's lower face over the floor.
+    /// Position of a point on the page (pt): z is the height of the robot's lower face above the floor.
     fn at(&self, [x, _, z]: [f64; 3]) -> (f64, f64) {
         let px = (mm_from_cm(x) - self.left) * self.scale;
         let pz = self.floor - (mm_from_cm(z) - self.bottom) * self.scale - ROBOT / 2.0;
@@ -142,7 +143,7 @@ impl Scene {
         }
     }
 
-    /// The voltage of each actuator below its middle, if there is room for all.
+    /// The voltage below the middle of each actuator, if there is room for all.
     fn numbers(&self, canvas: &mut Canvas, recording: &Recording, record: usize, volts: &[f64]) {
         let m = recording.meta.motors_per_actuator;
         let middle = |a: usize| self.at(recording.node(record, a * m + m.div_ceil(2))).0;
@@ -157,7 +158,7 @@ impl Scene {
         }
     }
 
-    /// Colours of the voltages with numbers.
+    /// The colour bar of the voltages.
     fn key(&self, canvas: &mut Canvas) {
         const STEPS: usize = 48;
         let (size, top) = (PAGE.font_pt, self.floor + 22.0);
@@ -188,7 +189,7 @@ impl Scene {
     }
 }
 
-/// Light grey for 0 V, towards blue for negative and red for positive voltages.
+/// Colour of a voltage as a share of the largest: light grey at 0, blue at −1, red at 1.
 fn shade(share: f64) -> [u8; 3] {
     let end = if share < 0.0 { [0.0, 90.0, 190.0] } else { [200.0, 60.0, 0.0] };
     end.map(|end| (225.0 + share.abs().min(1.0) * (end - 225.0)) as u8)

@@ -1,4 +1,4 @@
-//! A value over two others as coloured cells, and the colour bar.
+//! Heat maps: coloured cells over two keys, with a colour bar.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use super::canvas::{Anchor, Area, Canvas, Size};
 use super::figure::Figure;
 use super::text::{number, width};
 
-/// Colours of equal steps in lightness from dark to light, so that they stay in order in grey (after viridis).
+/// Colours of increasing lightness (after viridis), which keep their order in greyscale.
 const COLOURS: [[f64; 3]; 6] = [
     [68.0, 1.0, 84.0],
     [65.0, 68.0, 135.0],
@@ -16,10 +16,10 @@ const COLOURS: [[f64; 3]; 6] = [
     [122.0, 209.0, 81.0],
     [253.0, 231.0, 37.0],
 ];
-/// Steps of a colour bar.
+/// Number of steps of a colour bar.
 const STEPS: usize = 64;
 
-/// A colour of the scale, at a share from 0 to 1.
+/// The colour of the scale at `share`, 0 to 1, as `#rrggbb`.
 pub fn colour(share: f64) -> String {
     let at = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let low = (at as usize).min(COLOURS.len() - 2);
@@ -30,27 +30,27 @@ pub fn colour(share: f64) -> String {
     format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))
 }
 
-/// An axis of a heat map: label and the text of each column or row.
+/// An axis of a heat map.
 #[derive(Debug, Clone)]
 pub struct Categories {
-    /// Label with its unit.
+    /// Label with unit.
     pub label: String,
     /// One text per column or row.
     pub texts: Vec<String>,
 }
 
-/// A scale of colours with its label, which holds the unit.
+/// A colour scale with its label, which contains the unit.
 #[derive(Debug, Clone)]
 pub(super) struct Key {
     pub label: String,
     pub low: f64,
     pub high: f64,
-    /// Whether values are missing, which are hatched.
+    /// True if values are missing, which are hatched.
     pub missing: bool,
 }
 
 impl Key {
-    /// Over all values that are there.
+    /// The scale over all finite values.
     pub fn over(label: &str, values: &[Option<f64>]) -> Self {
         let known = values.iter().flatten().copied().filter(|v| v.is_finite());
         let (mut low, mut high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
@@ -68,7 +68,7 @@ impl Key {
         (value - self.low) / (self.high - self.low)
     }
 
-    /// Label, bar and numbers below one another, from `top` on; gives where they end.
+    /// Draws label, bar and numbers from `top` down; returns their lower edge (pt).
     pub fn draw(&self, canvas: &mut Canvas, left: f64, right: f64, top: f64, size: f64) -> f64 {
         canvas.out.push_str("<g class=\"key\">\n");
         canvas.text((left + right) / 2.0, top + 0.6 * size, size, Anchor::Middle, &self.label);
@@ -117,7 +117,7 @@ fn rectangle(out: &mut String, x: f64, y: f64, width: f64, height: f64, fill: &s
     let _ = writeln!(out, r#"<rect x="{x:.3}" y="{y:.3}" width="{width:.3}" height="{height:.3}" fill="{fill}"/>"#);
 }
 
-/// Hatching across a white cell.
+/// Draws a white cell with hatching.
 fn hatch(out: &mut String, area: Area) {
     rectangle(out, area.left, area.top, area.width(), area.height(), "#fff");
     let (width, height) = (area.width(), area.height());
@@ -133,7 +133,7 @@ fn hatch(out: &mut String, area: Area) {
     let _ = writeln!(out, r##"<path class="missing" d="{path}" fill="none" stroke="#888" stroke-width="0.5"/>"##);
 }
 
-/// Values over two axes, row after row from the bottom; missing ones are hatched.
+/// Values over two axes, rows × columns from the bottom row; missing values are hatched.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
     pub x: Categories,
@@ -149,7 +149,7 @@ impl Cells {
         let value =
             |row: usize, column: usize| self.values.get(row * columns + column).copied().flatten().filter(|v| v.is_finite());
         out.push_str("<g class=\"cells\">\n");
-        // Each cell reaches under its right and lower neighbours, which are painted later, so that no seams show.
+        // A cell extends below its right and lower neighbours, drawn later, to avoid seams.
         for row in (0..rows).rev() {
             let top = area.bottom - (row + 1) as f64 * high;
             for column in 0..columns {
@@ -166,7 +166,7 @@ impl Cells {
     }
 }
 
-/// Draws `values`, row after row from the bottom; missing ones are hatched.
+/// A heat map of `values`, rows × columns from the bottom row, as SVG; missing values are hatched.
 pub fn heat_map(title: &str, label: &str, x: &Categories, y: &Categories, values: &[Option<f64>]) -> String {
     let mut figure = Figure::new(title, &x.label, &y.label);
     figure.map(x, y, values, label);

@@ -1,4 +1,4 @@
-//! Pictures: figures as SVG, PNG and PDF, animations as HTML and GIF; what HTML pages share; numbers as people read them.
+//! Figures as SVG, PNG and PDF, animations as HTML and GIF, parts of HTML pages, and formatted numbers.
 
 mod axis;
 mod canvas;
@@ -19,7 +19,7 @@ pub use canvas::Size;
 pub use figure::Figure;
 pub use gif::gif;
 pub use heatmap::{Categories, colour, heat_map};
-pub use image::{pdf, png};
+pub use image::{ImageError, pdf, png};
 pub use number::{NONE, digits_for, fixed, minus, signed, significant};
 pub use player::player;
 pub use recordings::{Kind, aliased, amplitudes, shape, shapes, spectrum, traces};

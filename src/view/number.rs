@@ -1,8 +1,8 @@
-//! Numbers as people read them: a true minus sign, no negative zero, as many digits as mean something.
+//! Formatted numbers for pages, figures and Markdown tables: a true minus sign, no negative zero, significant digits.
 //!
-//! For pages, figures and Markdown tables. Files that programs read keep the plain formats of Rust.
+//! Files for programs have Rust's plain formats.
 
-/// Stands for a value that there is not.
+/// Text for a missing value.
 pub const NONE: &str = "–";
 
 /// `value` with `digits` after the point.
@@ -22,7 +22,7 @@ pub fn fixed(value: f64, digits: usize) -> String {
     if value < 0.0 && !is_zero { format!("−{text}") } else { text }
 }
 
-/// As [`fixed`], with a plus before what is above zero: for differences.
+/// As [`fixed`], with a plus sign before positive values, for differences.
 ///
 /// ```
 /// use sfers::view::signed;
@@ -34,7 +34,7 @@ pub fn signed(value: f64, digits: usize) -> String {
     if is_positive { format!("+{text}") } else { text }
 }
 
-/// `value` to `count` significant digits; as a power of ten where that would take more than six zeros.
+/// `value` with `count` significant digits, as a power of ten below 10⁻⁵ and from 10⁷.
 ///
 /// ```
 /// use sfers::view::significant;
@@ -64,12 +64,12 @@ fn superscript(c: char) -> char {
     }
 }
 
-/// Digits after the point that show two significant digits of `spread`: what a value known to within it is worth. At most six.
+/// Digits after the point, at most six, that show two significant digits of `spread`, the uncertainty of a value.
 pub fn digits_for(spread: f64) -> usize {
     if spread.is_finite() && spread > 0.0 { (1 - spread.log10().floor() as i32).clamp(0, 6) as usize } else { 4 }
 }
 
-/// A text with a true minus sign before every number that has a hyphen; hyphens within words stay.
+/// A text with true minus signs for the hyphens before numbers; hyphens within words are kept.
 ///
 /// ```
 /// use sfers::view::minus;

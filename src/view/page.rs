@@ -1,17 +1,17 @@
-//! What all HTML pages share: one self-contained document, readable on a phone and printed; well-formed XML, so that tests parse it.
+//! Parts of HTML pages: self-contained documents for screens, phones and print, in well-formed XML.
 
 use std::fmt::Write;
 
 use super::{Size, escape};
 
-/// A figure across the page, readable when a phone shrinks it by a quarter.
+/// Size of a figure across the page, readable at three quarters of its size on a phone.
 pub(crate) const WHOLE: Size = Size { width_mm: 130.0, font_pt: 9.0 };
-/// One of two figures beside one another.
+/// Size of one of two figures side by side.
 pub(crate) const HALF: Size = Size { width_mm: 115.0, font_pt: 8.5 };
 
 const STYLE: &str = include_str!("page.css");
 
-/// A whole page around `body`.
+/// A page with the given body.
 pub(crate) fn document(title: &str, body: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\
@@ -20,14 +20,14 @@ pub(crate) fn document(title: &str, body: &str) -> String {
     )
 }
 
-/// A figure to stand on a page under `name`, which no other figure of it has: ids are those of a page, so each figure's get its name.
+/// A figure element; `name`, unique on the page, prefixes the ids of its SVG.
 pub(crate) fn figure(name: &str, class: &str, svg: &str, caption: &str) -> String {
     let svg = svg.replace(" id=\"", &format!(" id=\"{name}-")).replace("url(#", &format!("url(#{name}-"));
     let caption = if caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>", escape(caption)) };
     format!("<figure class=\"{class}\">{svg}{caption}</figure>\n")
 }
 
-/// A table on a page. Numbers are set right; on a narrow screen the table scrolls in its box, or stacks its cells.
+/// A table. Numbers are right-aligned; on a narrow screen the table scrolls or stacks its cells.
 pub(crate) struct Table {
     columns: Vec<(String, bool)>,
     stacks: bool,
@@ -42,7 +42,7 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// Marks what is not as it should be.
+    /// Marks the cell as bad.
     pub fn bad_if(mut self, is_bad: bool) -> Self {
         self.is_bad = is_bad;
         self
@@ -56,14 +56,14 @@ impl<T: Into<String>> From<T> for Cell {
 }
 
 impl Table {
-    /// With these columns; `#` before a name sets its numbers right.
+    /// A table with these columns; a `#` before a name marks a column of numbers.
     pub fn new(columns: &[&str]) -> Self {
         let columns =
             columns.iter().map(|name| name.strip_prefix('#').map_or(((*name).into(), false), |name| (name.into(), true)));
         Self { columns: columns.collect(), stacks: false, rows: String::new() }
     }
 
-    /// On a narrow screen every row becomes a block of lines: for tables with text.
+    /// Stacks the cells of a row on a narrow screen, for tables with text.
     pub fn stacking(mut self) -> Self {
         self.stacks = true;
         self
@@ -86,7 +86,7 @@ impl Table {
         self
     }
 
-    /// The table in its box.
+    /// The HTML of the table.
     pub fn html(&self) -> String {
         let head: String = self
             .columns

@@ -1,4 +1,4 @@
-//! One pair of axes of a figure and what is drawn in it.
+//! One pair of axes of a figure with its contents.
 
 use std::fmt::Write;
 
@@ -8,12 +8,12 @@ use super::heatmap::{Cells, colour};
 use super::series::{Look, ROBOT, STYLES, Series, Style, shown};
 use super::text::{number, shorten, width};
 
-/// Grey of the lines at ticks.
+/// Colour of grid lines.
 const GRID: &str = "#e2e2e2";
 /// Height of a line of text as a multiple of the font size.
 pub(super) const LINE: f64 = 1.25;
 
-/// A signal on a strip of its own, such as the voltage of some actuators.
+/// A strip for one signal, such as the voltage of some actuators.
 #[derive(Debug, Clone)]
 pub(super) struct Lane {
     pub name: String,
@@ -21,6 +21,7 @@ pub(super) struct Lane {
     pub points: Vec<(f64, f64)>,
 }
 
+/// One pair of axes with its data and settings.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Panel {
     pub title: String,
@@ -31,7 +32,7 @@ pub(super) struct Panel {
     pub lanes: Vec<Lane>,
     pub cells: Option<Cells>,
     pub equal_aspect: bool,
-    /// Whether a flat panel of equal scales is drawn higher than true.
+    /// True if heights of a flat panel with equal scales are enlarged.
     pub enlarged: bool,
     pub y_numbers: bool,
     pub from_zero: bool,
@@ -50,7 +51,7 @@ impl Panel {
         self.series.iter().filter(|s| !s.label.is_empty())
     }
 
-    /// Whether labels stand at the ends of the series, as no more than five can be told apart by a legend.
+    /// True if labels are at the ends of the series, because a legend has at most five.
     pub fn ends_are_labelled(&self) -> bool {
         self.end_labels || self.labelled().count() > STYLES
     }
@@ -72,7 +73,7 @@ impl Panel {
         self.points().map(|p| p.1).chain(self.horizontals.iter().copied()).chain(notes).chain(cells).chain(floor)
     }
 
-    /// The scale of `values`, which begins at 0 where it should.
+    /// The scale of `values`, from 0 if wanted or if they are close to it.
     pub fn y_scale(&self, values: impl Iterator<Item = f64>) -> Scale {
         if self.cells.is_some() {
             return Scale::over(values, 0.0);
@@ -80,19 +81,19 @@ impl Panel {
         let values: Vec<f64> = values.collect();
         let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
         let mut scale = Scale::over(values.into_iter(), 0.06);
-        // What is far above 0 by its own size may begin elsewhere; heights, shares and amplitudes begin at 0.
+        // Values far above 0 relative to their range need not begin at 0, unless asked for.
         let near = low >= 0.0 && low <= 0.5 * high;
         let asked = (self.from_zero || self.floor) && high > 0.0 && low >= -0.02 * high;
         if (near && high > 0.0) || asked {
             scale.low = 0.0;
-            // Robots stand on their points and need room above.
+            // Robots are drawn above their points.
             let robots = self.series.iter().any(|s| matches!(s.look, Look::Robot { .. }));
             scale.high = high * if robots { 1.25 } else { 1.06 };
         }
         scale
     }
 
-    /// The styles of the series: by the place of their label among `labels`, or by their place in the panel.
+    /// The styles of the series, by the index of their label in `labels`, or by their index in the panel.
     pub fn styles(&self, labels: &[String]) -> Vec<Style> {
         let styled = self.series.iter().filter(|s| s.look == Look::Styled).count();
         let sequence = self.ends_are_labelled() || styled > STYLES;
@@ -112,7 +113,7 @@ impl Panel {
         self.series.iter().map(style).collect()
     }
 
-    /// Texts at the y axis and their values: numbers of ticks, names of lanes or of rows.
+    /// Values and texts of the y axis: ticks, names of lanes, or rows of a map.
     pub fn y_ticks(&self, y: &Scale, height: f64, size: f64) -> Vec<(f64, String)> {
         if !self.lanes.is_empty() {
             let n = self.lanes.len() as f64;
@@ -125,7 +126,7 @@ impl Panel {
         if !self.y_numbers {
             return Vec::new();
         }
-        // As many as stand apart, but two wherever there is room for them.
+        // As many as have room, at least two if they fit.
         let wanted = ((height / (2.2 * size)) as usize).clamp(2, 7);
         let counts = (wanted..=8).map(|count| y.ticks(count));
         let fits = |ticks: &[f64]| ticks.len() as f64 * 1.2 * size <= height + size;
@@ -133,12 +134,12 @@ impl Panel {
         ticks.into_iter().map(|tick| (tick, number(tick, digits))).collect()
     }
 
-    /// Texts at the x axis, few enough to stand apart.
+    /// Values and texts of the x axis, without overlap.
     pub fn x_ticks(&self, x: &Scale, across: f64, size: f64, texts: &[String]) -> Vec<(f64, String)> {
         let named = self.cells.as_ref().map(|cells| (&cells.x.texts[..], 0.5)).or((!texts.is_empty()).then_some((texts, 0.0)));
         if let Some((texts, begin)) = named {
             let step = across / x.range();
-            // Numbers are left out where they are too many, names lose their ends.
+            // Numbers are thinned out, names are shortened.
             let numbers = texts.iter().all(|t| t.replace('−', "-").parse::<f64>().is_ok());
             let widest = texts.iter().map(|t| width(t, size)).fold(0.0, f64::max) + 0.6 * size;
             let every = if numbers { widest / step } else { 3.0 * size / step }.ceil().max(1.0) as usize;
@@ -158,7 +159,7 @@ impl Panel {
         best
     }
 
-    /// Room that texts at the right of the panel need (pt).
+    /// Width of the texts to the right of the panel, at most `most` (pt).
     pub fn right_room(&self, size: f64, most: f64) -> f64 {
         let ends = self.labelled().filter(|_| self.ends_are_labelled()).map(|s| s.label.as_str());
         let remarks = self.lanes.iter().map(|lane| lane.remark.as_str());
@@ -166,12 +167,13 @@ impl Panel {
         if widest > 0.0 { widest.min(most) + if self.lanes.is_empty() { 12.0 } else { 4.0 } } else { 0.0 }
     }
 
-    /// Height that the texts beside the panel need at least (pt).
+    /// Least height for the texts beside the panel (pt).
     pub fn least_height(&self, size: f64) -> f64 {
         let ends = if self.ends_are_labelled() { self.labelled().count() } else { 0 };
         (1.15 * size * ends as f64).max(1.55 * size * self.lanes.len() as f64)
     }
 
+    /// Draws the contents of the axes `area`.
     #[allow(clippy::too_many_arguments)]
     pub fn draw(
         &self,
@@ -208,7 +210,7 @@ impl Panel {
         if self.floor {
             canvas.floor(left, right, y.at(0.0));
         }
-        // A picture within the picture cuts off what lies outside the axes, with room for the strokes at their edge.
+        // A nested SVG clips the data to the axes, with a margin for strokes.
         let rim = 3.0;
         let _ = writeln!(
             canvas.out,
@@ -228,7 +230,7 @@ impl Panel {
         }
     }
 
-    /// Labels beside the right edge at the heights of the series' ends, moved apart where they would touch.
+    /// Draws labels beside the right edge at the heights of the series' ends, moved apart to avoid overlap.
     #[allow(clippy::too_many_arguments)]
     fn draw_ends(&self, canvas: &mut Canvas, x: &Scale, y: &Scale, area: Area, styles: &[Style], size: f64, room: f64) {
         let end = |series: &Series| series.points.iter().rev().find(|p| shown(**p)).map(|p| (x.at(p.0), y.at(p.1)));
@@ -262,7 +264,7 @@ impl Panel {
         canvas.out.push_str("</g>\n");
     }
 
-    /// Texts at points of the plane, moved up where they would stand on one another.
+    /// Draws notes at their points, moved vertically to avoid overlap.
     fn draw_notes(&self, canvas: &mut Canvas, x: &Scale, y: &Scale, area: Area, size: f64) {
         let mut placed: Vec<Area> = Vec::new();
         for (at_x, at_y, text) in self.notes.iter().filter(|note| shown((note.0, note.1))) {

@@ -1,4 +1,4 @@
-//! A recording as a self-contained HTML page that plays it.
+//! Self-contained HTML pages that play recordings.
 
 use serde_json::json;
 
@@ -6,25 +6,25 @@ use super::text::escape;
 use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
 
-/// Frames that a page holds at most.
+/// Largest number of frames of a page.
 const FRAMES: usize = 2000;
-/// Speeds that the page offers, beside one that was wished for.
+/// Speeds of the page (1: real time), besides a requested one.
 const SPEEDS: [f64; 8] = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0];
-/// How long a recording should take to play (s), to choose the speed it begins with.
+/// Duration of playback at the initial speed (s).
 const WATCH: f64 = 8.0;
 
-/// Voltages of the actuators in one record (V).
+/// Voltages of the actuators in a record (V).
 pub(super) fn voltages(recording: &Recording, record: usize) -> Vec<f64> {
     let (joints, m) = (recording.joints(), recording.meta.motors_per_actuator);
     (0..recording.meta.actuators).map(|a| recording.motor_voltages[record * joints + a * m] * m as f64).collect()
 }
 
-/// Whether the robot lies on the floor: files of the reference say so by their keys, others by never going below it.
+/// True if the robot is on the ground.
 pub(super) fn on_ground(recording: &Recording) -> bool {
     recording.meta.ground.is_some()
 }
 
-/// The page, which plays at `speed` (1: real time) at first, or at one that takes some seconds.
+/// The page, with initial speed `speed` (1: real time; by default a duration of about eight seconds).
 pub fn player(title: &str, recording: &Recording, speed: Option<f64>) -> String {
     let round = |value: f64, to: f64| (value * to).round() / to;
     let stride = recording.len().div_ceil(FRAMES).max(1);
@@ -49,6 +49,6 @@ pub fn player(title: &str, recording: &Recording, speed: Option<f64>) -> String 
         "nodes": nodes,
         "volts": records().map(|r| voltages(recording, r).into_iter().map(|v| round(v, 10.0)).collect::<Vec<_>>()).collect::<Vec<_>>(),
     });
-    // Numbers only, so the text cannot end the script element.
+    // Only numbers, so the data cannot end the script element.
     include_str!("player.html").replace("@TITLE@", &escape(title)).replace("@DATA@", &data.to_string())
 }

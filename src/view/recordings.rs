@@ -8,18 +8,18 @@ use crate::model::units::mm_from_cm;
 use crate::recording::Recording;
 use crate::words;
 
-/// What is drawn of a recording.
+/// Kinds of figures of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// The robot's shape at some times.
     Shapes,
-    /// Heights of left end, middle and right end, and travel, in time.
+    /// Heights and travel of left end, middle and right end over time.
     Traces,
-    /// Amplitude spectra of the same heights.
+    /// Amplitude spectra of these heights.
     Spectrum,
 }
 
-/// Shapes drawn below one another at most.
+/// Largest number of shapes in a figure.
 const SHAPES: usize = 6;
 
 impl Kind {
@@ -56,7 +56,7 @@ impl Kind {
     }
 }
 
-/// Shapes of some records below one another, each with its time, over the floor for robots that lie on one.
+/// Shapes in some records, one panel each with its time, and the floor of robots on the ground.
 pub fn shapes(title: &str, recording: &Recording, records: &[usize]) -> Figure {
     let mut figure = Figure::new(title, "x (mm)", "z (mm)");
     for (i, &record) in records.iter().enumerate() {
@@ -72,12 +72,12 @@ pub fn shapes(title: &str, recording: &Recording, records: &[usize]) -> Figure {
     figure
 }
 
-/// What a recording says of its experiment.
+/// Settings of the experiment from the metadata of a recording.
 fn setting(recording: &Recording) -> String {
     let meta = &recording.meta;
     let plural = |n: usize, thing: &str| format!("{n} {thing}{}", if n == 1 { "" } else { "s" });
     let mut parts = vec![plural(meta.actuators, "actuator"), format!("m = {}", meta.motors_per_actuator)];
-    // A drive without a frequency is recorded as one of 1 Hz.
+    // Drives without a frequency are recorded with 1 Hz.
     if meta.driven_frequency.is_finite() && meta.driven_frequency > 0.0 && meta.driven_frequency != 1.0 {
         parts.push(format!("{} Hz", significant(meta.driven_frequency, 4)));
     }
@@ -89,7 +89,7 @@ fn setting(recording: &Recording) -> String {
     parts.join(", ")
 }
 
-/// The nodes of one record, x and z (mm).
+/// Positions x, z (mm) of the nodes in a record.
 pub fn shape(recording: &Recording, record: usize) -> Vec<(f64, f64)> {
     (0..recording.nodes())
         .map(|node| {
@@ -99,16 +99,17 @@ pub fn shape(recording: &Recording, record: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Name and index of left end, middle and right end.
+/// Names and indices of left end, middle and right end.
 fn watched(recording: &Recording) -> [(&'static str, usize); 3] {
     [("left end", 0), ("middle", recording.nodes() / 2), ("right end", recording.nodes() - 1)]
 }
 
+/// Height of a node in every record (mm).
 fn height(recording: &Recording, node: usize) -> Vec<f64> {
     (0..recording.len()).map(|record| mm_from_cm(recording.node(record, node)[2])).collect()
 }
 
-/// Heights and travel of ends and middle in time, and the voltages of the actuators in a strip below.
+/// Heights and travel of ends and middle over time, and the voltages of the actuators in strips below.
 pub fn traces(title: &str, recording: &Recording) -> Figure {
     let mut figure = Figure::new(title, "time (ms)", "height z (mm)");
     let in_time = |values: Vec<f64>| recording.time.iter().zip(values).map(|(t, v)| (1e3 * t, v)).collect::<Vec<_>>();
@@ -143,7 +144,7 @@ pub fn traces(title: &str, recording: &Recording) -> Figure {
     figure
 }
 
-/// Numbers as a list, with runs of three and more as a range: "1–3, 5".
+/// A list of numbers, with runs of three or more as ranges: "1–3, 5".
 fn numbers(list: &[usize]) -> String {
     let runs = list.chunk_by(|a, b| a + 1 == *b);
     let text = |run: &[usize]| match run {
@@ -153,7 +154,7 @@ fn numbers(list: &[usize]) -> String {
     runs.map(text).collect::<Vec<_>>().join(", ")
 }
 
-/// Amplitude spectra of the heights of ends and middle, up to where they have fallen to nothing.
+/// Amplitude spectra of the heights of ends and middle, up to 1.5 times the highest frequency with 1 % of the largest amplitude.
 pub fn spectrum(title: &str, recording: &Recording) -> Figure {
     let mut figure = Figure::new(title, "frequency (Hz)", "amplitude of z (mm)");
     let spectra: Vec<_> = watched(recording)
@@ -166,7 +167,7 @@ pub fn spectrum(title: &str, recording: &Recording) -> Figure {
     for (label, spectrum) in spectra {
         let shown: Vec<_> = spectrum.into_iter().filter(|p| p.0 <= 1.5 * limit).collect();
         let peak = shown.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1));
-        // The peaks stand in the legend, where they cannot print over one another.
+        // Peaks are in the legend, where they cannot overlap.
         let label = match peak.filter(|p| p.1 > 0.0) {
             Some((f, a)) => format!("{label}: {} mm at {} Hz", significant(a, 3), number(f, 1)),
             None => label.to_owned(),
@@ -176,14 +177,13 @@ pub fn spectrum(title: &str, recording: &Recording) -> Figure {
     figure
 }
 
-/// Single-sided amplitude spectrum of a signal without its straight line, under a Hann window: frequency (Hz) and amplitude.
+/// Single-sided amplitude spectrum of a detrended signal with a Hann window: pairs of frequency (Hz) and amplitude.
 ///
 /// ```text
 /// A(f) = 2/Σw |Σ w_n x_n e^(−2πi f t_n)|,    w_n = (1 − cos 2πn/(N−1))/2
 /// ```
 ///
-/// at multiples of a quarter of 1/duration. A sine of amplitude a, many periods long, gives a at its frequency. Samples are interpolated
-/// to even spacing.
+/// at multiples of 1/(4 duration). A sine of many periods gives its amplitude at its frequency. Samples are interpolated to even spacing.
 pub fn amplitudes(times: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let n = times.len();
     if n < 4 {
@@ -260,7 +260,7 @@ fn times([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
     [a * c - b * d, a * d + b * c]
 }
 
-/// Fourier transform in place, of a power of two numbers.
+/// In-place radix-2 Fourier transform; the length is a power of two.
 fn fourier(values: &mut [[f64; 2]]) {
     let n = values.len();
     let bits = n.trailing_zeros();
@@ -293,18 +293,17 @@ fn fourier(values: &mut [[f64; 2]]) {
     }
 }
 
-/// Harmonics of a drive that should be below half the record rate: those of a square wave fall with their number.
+/// Number of harmonics of the drive that should lie below half the record rate.
 const HARMONICS: f64 = 5.0;
 
-/// What a recording is too coarse for: its drive, or the first harmonics of it, above half the record rate, which a spectrum shows at wrong
-/// frequencies.
+/// A warning if the drive or its first harmonics lie above half the record rate and alias in a spectrum.
 pub fn aliased(recording: &Recording) -> Option<String> {
     let (&first, &last) = (recording.time.first()?, recording.time.last()?);
     let half = 0.5 * (recording.len() - 1) as f64 / (last - first);
     let meta = &recording.meta;
     let drive = match &meta.ground {
         Some(ground) if ground.period > 0.0 => 1.0 / ground.period,
-        // Where the drive has no frequency it says 1 Hz.
+        // Drives without a frequency are recorded with 1 Hz.
         _ if meta.driven_frequency == 1.0 && recording.motor_voltages.windows(2).all(|pair| pair[0] == pair[1]) => return None,
         _ => meta.driven_frequency,
     };

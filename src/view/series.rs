@@ -1,18 +1,18 @@
-//! Series of points: styles that differ without colour, lines, markers, robots.
+//! Series of points with lines, markers and robots; styles are distinguishable without colour.
 
 use std::fmt::Write;
 
 use super::axis::Scale;
 
-/// Styles at most; where a panel has more series, labels stand at their ends.
+/// Number of styles; a panel with more series has labels at their ends.
 pub(super) const STYLES: usize = 5;
-/// Of Okabe and Ito's palette, safe for the colour-blind, in an order that alternates dark and light.
+/// Colours of Okabe and Ito's colour-blind safe palette, alternately dark and light.
 const COLOURS: [&str; STYLES] = ["#000000", "#d55e00", "#0072b2", "#009e73", "#cc79a7"];
 /// Dashes (pt).
 const DASHES: [&str; STYLES] = ["", "5 2", "1.4 1.4", "7 1.6 1.4 1.6", "10 3"];
-/// Markers along a line whose points have none.
+/// Number of markers along a line without markers at its points.
 const MARKERS: usize = 6;
-/// Points between two of which a line is drawn closer than this (pt) are left out, except for the extremes.
+/// Width of the bins in which a line keeps only first, last and extreme points (pt).
 const BIN: f64 = 0.25;
 
 /// How a series is drawn.
@@ -26,14 +26,14 @@ pub enum Mark {
     Both,
 }
 
-/// Where a series has its colour and dash from.
+/// Source of a series' colour and dash.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Look {
     /// One of the five styles, by its place among the styled series of the panel.
     Styled,
-    /// A solid line of a colour of its own.
+    /// A solid line of a given colour and width (pt).
     Plain { colour: String, width: f64 },
-    /// A robot: thick, its lower face at the height of the points.
+    /// A robot: a thick line with its lower face at the points.
     Robot { colour: String },
 }
 
@@ -45,22 +45,22 @@ pub(super) struct Series {
     pub look: Look,
 }
 
-/// How thick robots are drawn (pt).
+/// Thickness of robots (pt).
 pub(super) const ROBOT: f64 = 2.6;
 
-/// Whether a point can be drawn at all.
+/// True if a point can be scaled to the page.
 pub(super) fn shown((x, y): (f64, f64)) -> bool {
     x.abs() < 1e100 && y.abs() < 1e100
 }
 
-/// How one series looks: style, colour, dash and width of its line.
+/// Style of one series: marker, colour, dash and width (pt).
 #[derive(Debug, Clone)]
 pub(super) struct Style {
     pub index: usize,
     pub colour: String,
     pub dash: &'static str,
     pub width: f64,
-    /// Markers along lines without points, which tell styles apart.
+    /// True if lines without points have some markers.
     pub sparse: bool,
 }
 
@@ -108,7 +108,7 @@ impl Style {
 
 impl Series {
     pub fn draw(&self, out: &mut String, x: &Scale, y: &Scale, style: &Style, place: f64) {
-        // The points of a robot are its lower face: in a recording z is the height of the centre line over where it lies when flat.
+        // z of a recording is the height of the centre line above its height on the flat robot, drawn as the lower face.
         let lift = if matches!(self.look, Look::Robot { .. }) { ROBOT / 2.0 } else { 0.0 };
         let at = |p: &(f64, f64)| (x.at(p.0), y.at(p.1) - lift);
         if self.mark != Mark::Points {
@@ -134,7 +134,7 @@ impl Series {
         }
     }
 
-    /// The sample of a legend.
+    /// Draws the sample in a legend.
     pub fn sample(&self, out: &mut String, style: &Style, left: f64, middle: f64, width: f64) {
         if self.mark != Mark::Points {
             let _ = writeln!(
@@ -150,7 +150,7 @@ impl Series {
     }
 }
 
-/// Of many points on the page, in order of x, those that show: of each bin first, lowest, highest and last.
+/// Thins out many points (pt) in order of x: keeps the first, lowest, highest and last of each bin.
 fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() < 4000 || points.windows(2).any(|w| w[1].0 < w[0].0) {
         return points.to_vec();

@@ -1,11 +1,11 @@
-//! Text: its width in the font that pictures are drawn with, breaking into lines, signs of numbers, XML.
+//! Text: width in the embedded font, line breaks, minus signs, XML.
 
 use std::sync::OnceLock;
 
-/// Fonts of an SVG. The layout counts with the first, which PNG, PDF and GIF carry; the others are narrower.
+/// Fonts of an SVG. The layout assumes the first, which PNG, PDF and GIF embed; the others are narrower.
 pub(super) const FAMILY: &str = "'DejaVu Sans', Arial, Helvetica, sans-serif";
 
-/// The bytes of the font that PNG, PDF and GIF are drawn with.
+/// The font of PNG, PDF and GIF, as TrueType.
 pub(super) fn font() -> &'static [u8] {
     dejavu::sans::regular()
 }
@@ -16,12 +16,12 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     let face = FACE.get_or_init(|| ttf_parser::Face::parse(font(), 0).ok());
     let Some(face) = face else { return 0.7 * size * text.chars().count() as f64 };
     let advance = |c: char| face.glyph_index(c).and_then(|glyph| face.glyph_hor_advance(glyph));
-    // A sign that the font lacks is taken from another one, where it is an em wide at most.
+    // A glyph from a fallback font is at most an em wide.
     let units = f64::from(face.units_per_em());
     text.chars().map(|c| advance(c).map_or(units, f64::from)).sum::<f64>() * size / units
 }
 
-/// The text in lines no wider than `most`, broken at spaces; a word that is wider by itself loses its end.
+/// The text in lines no wider than `most`, broken at spaces; longer words are shortened.
 pub(super) fn wrap(text: &str, size: f64, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -36,7 +36,7 @@ pub(super) fn wrap(text: &str, size: f64, most: f64) -> Vec<String> {
     lines
 }
 
-/// The text, or its beginning and an ellipsis where it is wider than `most`.
+/// The text, shortened with an ellipsis if it is wider than `most`.
 pub(super) fn shorten(text: &str, size: f64, most: f64) -> String {
     if width(text, size) <= most {
         return text.to_owned();
@@ -51,7 +51,7 @@ pub(super) fn shorten(text: &str, size: f64, most: f64) -> String {
     String::new()
 }
 
-/// A number with a true minus sign, and none on a zero.
+/// A number with `digits` after the point, a true minus sign and no negative zero.
 pub(super) fn number(value: f64, digits: usize) -> String {
     if digits > 6 || value.abs() >= 1e7 {
         return format!("{value:.1e}").replace('-', "−");
@@ -73,7 +73,7 @@ pub(super) fn significant(value: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Minus signs where a hyphen stands before a number, as in "-1500 V" but not in "jump-14hz".
+/// Replaces hyphens before numbers by minus signs, in "-1500 V" but not in "jump-14hz".
 pub(super) fn minus_signs(text: &str) -> String {
     let chars: Vec<char> = text.chars().collect();
     let before = |i: usize| i == 0 || !(chars[i - 1].is_alphanumeric() || ")]_-".contains(chars[i - 1]));
@@ -81,7 +81,7 @@ pub(super) fn minus_signs(text: &str) -> String {
     chars.iter().enumerate().map(|(i, &c)| if c == '-' && before(i) && after(i) { '−' } else { c }).collect()
 }
 
-/// Text as it may stand in XML. Control characters, which XML does not allow, are left out.
+/// Escapes a text for XML and removes control characters, which XML does not allow.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
