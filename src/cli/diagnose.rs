@@ -1,4 +1,4 @@
-//! `sfers diagnose`: what the simulation gets wrong, and why.
+//! `sfers diagnose`: causes of model error from measured data.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ use crate::diagnose::diagnosis::Verdict;
 use crate::diagnose::{DiagnoseError, extended, observations, pipeline, protocols, quality, report, robot::RobotPlant};
 use crate::files::{FolderLock, Locking};
 
-/// Say what the simulation gets wrong beside measured data, name the cause, and measure what it gains on runs that no fit saw.
+/// Find from measured data what the simulation gets wrong, name the cause, and measure the gain on held-out runs.
 ///
 /// Writes DIR/diagnosis.json, report.html, extended.toml (with drive.csv) and residuals.csv, and prints the verdict.
 ///
@@ -49,11 +49,11 @@ impl From<DiagnoseError> for Failure {
     }
 }
 
-/// What an interrupt needs to know.
+/// The state of the command, for interrupts.
 struct Work {
     /// The lock on the folder of the results.
     lock: Option<FolderLock>,
-    /// Whether the first file has been begun: all of them are there some milliseconds later, and the process ends by itself.
+    /// True from the first written file on: the process then ends by itself within milliseconds.
     writing: bool,
 }
 
@@ -63,7 +63,7 @@ fn work() -> MutexGuard<'static, Work> {
     WORK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends the process, with the lock taken away, unless results are being written.
+/// Releases the lock and ends the process, unless results are being written.
 fn interrupt() {
     let mut work = work();
     if !work.writing {
@@ -116,7 +116,7 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
     }
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let start = Instant::now();
-    let progress = |what: &str| bar.set_message(what.to_owned());
+    let progress = |task: &str| bar.set_message(task.to_owned());
     let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
     let result = pool.install(|| -> Result<_, DiagnoseError> {
         if dataset.runs.is_empty() {

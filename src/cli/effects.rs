@@ -9,7 +9,7 @@ use crate::effects::EFFECTS;
 
 pub fn run(options: Options) -> Result<ExitCode, Failure> {
     if options.json {
-        // JSON has no infinity: such values are given as words.
+        // JSON has no infinity; such values are strings.
         let number = |value: f64| if value.is_finite() { json!(value) } else { json!(value.to_string()) };
         let effects: Vec<_> = EFFECTS
             .iter()

@@ -20,10 +20,10 @@ use super::plant::{Model, Plant};
 const DIFFERENCE: f64 = 0.02;
 /// A fit has converged when χ² falls by less than this share of the number of values, ...
 const TOLERANCE: f64 = 1e-6;
-/// ... or by less than this share of χ² above it: to the end, and to rank models.
+/// ... or by less than this share of χ² beyond the number of values: for full convergence, and to rank models.
 const RELATIVE_TOLERANCE: f64 = 1e-4;
 const RELATIVE_TOLERANCE_TO_RANK: f64 = 2e-2;
-/// Most iterations: to the end, and to rank models.
+/// Most iterations: for full convergence, and to rank models.
 const MOST_ITERATIONS: usize = 25;
 const MOST_ITERATIONS_TO_RANK: usize = 8;
 /// Values in a block over which residuals may be correlated.
@@ -47,11 +47,11 @@ pub type Nuisances = Vec<Vec<f64>>;
 /// A fitted model.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The model at its best.
+    /// The fitted model.
     pub model: Model,
-    /// χ² over the runs that were fitted.
+    /// χ² of the fitted runs.
     pub chi2: f64,
-    /// Number of values in them.
+    /// Number of values in the fitted runs.
     pub count: usize,
     /// Information JᵀJ, coordinates × coordinates, of residuals in σ.
     pub information: DMatrix<f64>,

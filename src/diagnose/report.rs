@@ -18,7 +18,7 @@ const RUNS: usize = 3;
 const ROWS: usize = 700;
 /// Most candidates in the table.
 const CANDIDATES: usize = 12;
-/// Least root mean sum_of_squares residual of a run (σ) that is marked.
+/// Least root mean square residual of a run (σ) that is marked.
 const LARGE: f64 = 1.2;
 
 /// The report's inputs other than the outcome.
@@ -302,7 +302,7 @@ fn tests(out: &mut String, d: &Diagnosis) {
     );
     let models = [("nominal", &d.baseline), ("re-tuned", &d.calibrated), ("extended", &d.extended)];
     let picture = picture::residual_tests(&models.map(|(name, stage)| (name, stage.residual_tests.as_slice())));
-    let caption = "A row for each run, a column for each test; crossed where the residuals are not noise. Size: chi-sum_of_squares per value. Neighbours, input, \
+    let caption = "A row for each run, a column for each test; crossed where the residuals are not noise. Size: chi-square per value. Neighbours, input, \
                    input's rate: correlation with them. The others are named in full below.";
     out.push_str(&figure("tests", "wide", &picture, caption));
     let mut table =

@@ -751,7 +751,7 @@ mod tests {
 
     #[test]
     fn two_causes_that_mask_one_another_are_found_together() {
-        // Together they make a wave of amplitude 0.12 × 12; one of them alone can take up 0.4 % of its sum_of_squares.
+        // Together they make a wave of amplitude 0.12 × 12; one of them alone can take up 0.4 % of its square.
         let mut both = found(&Waves::new(&[("first", 12.0), ("second", 12.0)]));
         both.sort_unstable();
         assert_eq!(both, ["first", "second"]);

@@ -1,10 +1,10 @@
-//! Extensions of the model: what a linear torque law leaves out, one file per effect, in folders by where it acts.
+//! Effects that extend the nominal model, one file each, in folders by where they act.
 //!
-//! An [`Effect`] is a fixed description: cause, equation, parameters with bounds and the value at which it vanishes. An [`Applied`] effect has
-//! values. Where an effect acts is its [`Action`]: it changes the robot or the drive before a run, passes voltages on during the run
-//! ([`Voltages`]), or changes what is seen of the run ([`View`]). An effect at its off value is left out, so the bits are those of the plain model.
+//! An [`Effect`] is a description: cause, equation, source, and parameters with bounds and off values, at which it vanishes. An [`Applied`] effect has
+//! values. Its [`Action`] changes the robot or the drive before a run, filters voltages during the run ([`SignalStage`]), or changes the recorded
+//! positions ([`View`]). An effect at its off values is skipped, so the bits are those of the nominal model.
 //!
-//! Voltages pass the effects in the order of [`EFFECTS`], whatever the order in the file: the driver's first, then the actuators'.
+//! Voltages pass the effects in the order of [`EFFECTS`], not in that of the file: drivers first, then actuators.
 
 mod actuation;
 mod calibration;
@@ -26,13 +26,13 @@ use crate::drive::Drive;
 use crate::model::Robot;
 use crate::words::{did_you_mean, number};
 
-/// Where an effect acts.
+/// The part of the system on which an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 pub enum Kind {
-    /// A constant of the nominal model is off.
+    /// Constants of the nominal model.
     #[serde(rename = "calibration")]
     Calibration,
-    /// Finite joints and steps.
+    /// Discretisation: number of joints and time step.
     #[serde(rename = "numerics")]
     Numerics,
     /// Mounting and structure.
@@ -44,10 +44,10 @@ pub enum Kind {
     /// Between the commanded and the applied voltage.
     #[serde(rename = "driver")]
     Driver,
-    /// Between robot and floor.
+    /// Contact between robot and ground.
     #[serde(rename = "ground")]
     Ground,
-    /// Between the robot and what is recorded of it.
+    /// Between the robot and its record.
     #[serde(rename = "measurement")]
     Measurement,
 }
@@ -67,65 +67,65 @@ impl Kind {
     }
 }
 
-/// A number of an effect.
+/// A parameter of an effect.
 #[derive(Debug, PartialEq)]
 pub struct Parameter {
     /// Key in `[[effect]]` tables.
     pub name: &'static str,
-    /// Unit, empty for plain numbers.
+    /// Unit; empty for dimensionless ones.
     pub unit: &'static str,
-    /// Range.
+    /// Least and largest value, in `unit`.
     pub bounds: [f64; 2],
-    /// The value at which the effect vanishes; none for a parameter that cannot switch it off by itself.
+    /// The value at which the effect vanishes, in `unit`; none if the parameter cannot switch it off.
     pub off: Option<f64>,
-    /// The value where a file gives none; none if it must be given.
+    /// The default value, in `unit`; none if the parameter is required.
     pub default: Option<f64>,
-    /// What it is.
+    /// Its description.
     pub about: &'static str,
 }
 
 impl Parameter {
-    /// A factor, 1 where it changes nothing.
+    /// A factor, with the off value 1.
     const fn scale(bounds: [f64; 2], about: &'static str) -> Self {
         Self { name: "scale", unit: "", bounds, off: Some(1.0), default: None, about }
     }
 }
 
-/// Where and how an effect acts. All functions take the parameters in the order of the description, in the units of files.
+/// How an effect acts. All functions take the parameters in the order of [`Effect::parameters`], in their units.
 #[derive(Debug, Clone, Copy)]
 pub enum Action {
     /// Changes the robot.
     Robot(fn(&[f64], &mut Robot)),
     /// Changes the drive.
     Drive(fn(&[f64], &mut Drive)),
-    /// Passes on the voltages of so many actuators in a run of so many seconds.
+    /// Filters voltages: makes a stage for a number of actuators and a duration (s).
     Voltages(fn(&[f64], usize, f64) -> Box<dyn SignalStage>),
-    /// Changes what is seen.
+    /// Changes the recorded positions.
     View(fn(&[f64], &mut View)),
-    /// Changes joints per actuator, and the time step by a factor.
+    /// Changes the number of joints per actuator and the time step.
     Discretisation,
 }
 
 /// A description of an effect.
 #[derive(Debug)]
 pub struct Effect {
-    /// Its name in files.
+    /// Its id in files.
     pub id: &'static str,
-    /// Where it acts.
+    /// The part on which it acts.
     pub kind: Kind,
     /// Its cause in a sentence.
     pub cause: &'static str,
     /// Its equation, in CGS units.
     pub equation: &'static str,
-    /// Where the equation comes from.
+    /// The source of the equation.
     pub source: &'static str,
-    /// Its numbers.
+    /// Its parameters.
     pub parameters: &'static [Parameter],
-    /// What it does.
+    /// Its action.
     pub action: Action,
 }
 
-/// All effects, in the order in which they act.
+/// All effects, in the order of their action.
 pub static EFFECTS: &[&Effect] = &[
     &calibration::STIFFNESS,
     &calibration::ACTUATION_GAIN,
@@ -159,19 +159,19 @@ pub static EFFECTS: &[&Effect] = &[
     &measurement::CAMERA_TILT,
 ];
 
-/// The effect of that name.
+/// The effect with an id; none if there is none.
 pub fn find(id: &str) -> Option<&'static Effect> {
     EFFECTS.iter().copied().find(|effect| effect.id == id)
 }
 
-/// An effect that cannot be applied as it is written.
+/// An effect that cannot be applied.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EffectError {
     /// No such effect.
     #[error("there is no effect {0:?}{hint}; `sfers effects` lists them", hint = did_you_mean(.0, EFFECTS.iter().map(|effect| effect.id)))]
     Unknown(String),
-    /// A key that is no parameter of it.
+    /// A key that is no parameter of the effect.
     #[error("effect {id} has no parameter {name:?}; it takes {known}{hint}", hint = did_you_mean(.name, .known.split(", ")))]
     UnknownParameter {
         /// The effect.
@@ -181,7 +181,7 @@ pub enum EffectError {
         /// Its parameters.
         known: String,
     },
-    /// A parameter without default is missing.
+    /// A required parameter is missing.
     #[error("effect {id} needs {name}")]
     Missing {
         /// The effect.
@@ -216,9 +216,9 @@ pub enum EffectError {
 /// An effect with values, in the units of files.
 #[derive(Debug, Clone)]
 pub struct Applied {
-    /// What it is.
+    /// The description.
     pub effect: &'static Effect,
-    /// One value per parameter.
+    /// Values of the parameters, in their order and units.
     pub values: Vec<f64>,
 }
 
@@ -235,10 +235,10 @@ impl Effect {
         Applied { effect: self, values }
     }
 
-    /// The effect with the values given; the others are at their defaults.
+    /// The effect with given values (name, value); the others are at their defaults.
     ///
     /// # Errors
-    /// [`EffectError`] names the parameter.
+    /// [`EffectError`] if a parameter is unknown, missing or out of range.
     pub fn with<'a>(&'static self, given: impl IntoIterator<Item = (&'a str, f64)>) -> Result<Applied, EffectError> {
         let mut values: Vec<Option<f64>> = self.parameters.iter().map(|p| p.default).collect();
         for (name, value) in given {
@@ -247,7 +247,7 @@ impl Effect {
                 return Err(EffectError::UnknownParameter { id: self.id, name: name.into(), known: known.join(", ") });
             };
             let p = &self.parameters[index];
-            // An infinite value that stands for none lies outside the bounds of what can be fitted.
+            // Infinite off values and defaults lie outside the bounds.
             if !(p.bounds[0]..=p.bounds[1]).contains(&value) && ![p.off, p.default].contains(&Some(value)) {
                 let [low, high] = p.bounds;
                 return Err(EffectError::Range { id: self.id, name: p.name, value, low, high });
@@ -261,12 +261,12 @@ impl Effect {
 }
 
 impl Applied {
-    /// Whether it does nothing: all parameters that can switch it off do.
+    /// True if all parameters with an off value have it.
     pub fn is_off(&self) -> bool {
         self.effect.parameters.iter().zip(&self.values).all(|(p, value)| p.off.is_none_or(|off| *value == off))
     }
 
-    /// The value of a parameter.
+    /// The value of a parameter, in its unit; none if the effect has no such parameter.
     pub fn get(&self, name: &str) -> Option<f64> {
         let index = self.effect.parameters.iter().position(|p| p.name == name)?;
         self.values.get(index).copied()
@@ -294,13 +294,13 @@ impl Applied {
     }
 }
 
-/// Puts effects into a robot and its drive.
+/// Applies effects to a robot and its drive.
 ///
 /// # Errors
-/// [`EffectError::Robot`] if one does not fit the robot.
+/// [`EffectError::Robot`] if an effect does not fit the robot.
 pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Result<(), EffectError> {
     effects.iter().try_for_each(|applied| applied.check(robot))?;
-    // The number of joints first: others have a value per joint.
+    // The number of joints first: some effects have a value per joint.
     if let Some(joints) = joints(effects) {
         robot.motors_per_actuator = joints;
     }
@@ -314,13 +314,41 @@ pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Resul
     Ok(())
 }
 
-/// Joints per actuator that effects ask for.
+/// Joints per actuator set by effects; none if they set none.
 pub fn joints(effects: &[Applied]) -> Option<usize> {
     let joints = effects.iter().filter_map(|applied| applied.get("motors_per_actuator")).find(|joints| *joints > 0.0);
     joints.map(|joints| joints as usize)
 }
 
-/// Factor on the time step that effects ask for.
+/// Factor on the time step set by effects.
 pub fn time_step_scale(effects: &[Applied]) -> f64 {
     effects.iter().filter_map(|applied| applied.get("time_step_scale")).product()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_head_of_every_file_has_cause_equation_parameters_and_source_of_its_effect() {
+        let single_spaced = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        for effect in EFFECTS {
+            let folder = format!("{:?}", effect.kind).to_lowercase();
+            let path = format!("{}/src/effects/{folder}/{}.rs", env!("CARGO_MANIFEST_DIR"), effect.id.replace('-', "_"));
+            let text = std::fs::read_to_string(&path).unwrap();
+            let lines = text.lines().map_while(|line| line.strip_prefix("//!"));
+            let head = single_spaced(&lines.collect::<Vec<_>>().join("\n"));
+            let mut rest = head.as_str();
+            let parameters = effect.parameters.iter().map(|p| {
+                let unit = if p.unit.is_empty() { "–" } else { p.unit };
+                format!("* `{}` ({unit}): {}", p.name, p.about)
+            });
+            let parts =
+                [effect.cause.to_owned(), effect.equation.to_owned(), "# Parameters".into()].into_iter().chain(parameters);
+            for part in parts.chain([format!("# Source {}", effect.source)]) {
+                let at = rest.find(&single_spaced(&part)).unwrap_or_else(|| panic!("{path}: {part:?} is not in {rest:?}"));
+                rest = &rest[at..];
+            }
+        }
+    }
 }

@@ -1,41 +1,41 @@
-//! The way of the voltages from command to actuator.
+//! The signal chain from commanded to effective voltages.
 
 use super::{Action, Applied, EFFECTS};
 
-/// Passes on the voltages of all actuators, step by step, with whatever memory that takes.
+/// A stage of the signal chain: a filter of the voltages of all actuators, which may have a state.
 pub trait SignalStage: Send {
-    /// Comes to rest at constant `volts` (V), one per actuator, and turns them into what comes out.
+    /// Sets the state of rest at constant input voltages `volts` (V, one per actuator), and replaces them by the output.
     fn settle(&mut self, volts: &mut [f64]);
 
-    /// Turns the mean voltages of a step of `dt` (s) into what comes out.
+    /// Advances the state by a step of `dt` (s), and replaces the step's mean input voltages `volts` (V) by the mean output.
     fn pass(&mut self, dt: f64, volts: &mut [f64]);
 
-    /// Into how many parts a step is better cut where the voltage may jump within it.
+    /// Number of parts into which a step is divided if the voltage may jump within it.
     fn parts(&self) -> usize {
         1
     }
 
-    /// Its memory, as numbers for storing.
+    /// The state as numbers, for checkpoints.
     fn memory(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// How many numbers at the beginning of `saved` are a memory of its; none if they cannot be.
+    /// Length of this stage's state at the beginning of `saved`; none if `saved` does not begin with one.
     fn held(&self, saved: &[f64]) -> Option<usize> {
         Some(self.memory().len()).filter(|len| *len <= saved.len())
     }
 
-    /// Takes up a memory that [`held`](Self::held) has found.
+    /// Restores a state of the length that [`held`](Self::held) returned.
     fn remember(&mut self, _memory: &[f64]) {}
 }
 
-/// All voltage effects of a run, in the order in which they act.
+/// The stages of a run, in the order of [`EFFECTS`].
 pub struct SignalChain {
     stages: Vec<Box<dyn SignalStage>>,
 }
 
 impl SignalChain {
-    /// The way through `effects` for a robot of `actuators` actuators in a run of `duration` (s).
+    /// The chain of `effects` for a number of `actuators` and a run of `duration` (s).
     pub fn new(effects: &[Applied], actuators: usize, duration: f64) -> Self {
         let of =
             |id: &str| effects.iter().filter(move |applied| applied.effect.id == id && !applied.is_off()).collect::<Vec<_>>();
@@ -46,37 +46,37 @@ impl SignalChain {
         Self { stages: stages.collect() }
     }
 
-    /// Whether nothing stands in the way.
+    /// True without stages.
     pub fn is_empty(&self) -> bool {
         self.stages.is_empty()
     }
 
-    /// Comes to rest at `volts`, which become what comes out.
+    /// Sets the state of rest at constant input voltages `volts` (V, one per actuator), and replaces them by the output.
     pub fn settle(&mut self, volts: &mut [f64]) {
         self.stages.iter_mut().for_each(|stage| stage.settle(volts));
     }
 
-    /// Passes on a step's mean voltages.
+    /// Advances all stages by a step of `dt` (s), and replaces the step's mean input voltages `volts` (V) by the mean output.
     pub fn pass(&mut self, dt: f64, volts: &mut [f64]) {
         self.stages.iter_mut().for_each(|stage| stage.pass(dt, volts));
     }
 
-    /// Into how many parts steps are better cut.
+    /// Number of parts into which a step is divided if the voltage may jump within it.
     pub fn parts(&self) -> usize {
         self.stages.iter().map(|stage| stage.parts()).max().unwrap_or(1)
     }
 
-    /// All memory, as numbers for storing.
+    /// The state of all stages as numbers, for checkpoints.
     pub fn save(&self) -> Vec<f64> {
         self.stages.iter().flat_map(|stage| stage.memory()).collect()
     }
 
-    /// How many numbers at the beginning of `saved` are a memory of this path; none if they cannot be.
+    /// Length of the chain's state at the beginning of `saved`; none if `saved` does not begin with one.
     pub fn held(&self, saved: &[f64]) -> Option<usize> {
         self.stages.iter().try_fold(0, |held, stage| Some(held + stage.held(&saved[held..])?))
     }
 
-    /// Takes those numbers up again.
+    /// Restores a state from [`save`](Self::save).
     pub fn load(&mut self, mut saved: &[f64]) {
         for stage in &mut self.stages {
             let Some((own, rest)) = stage.held(saved).and_then(|held| saved.split_at_checked(held)) else { return };

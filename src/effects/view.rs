@@ -1,15 +1,15 @@
-//! What a camera makes of positions.
+//! The camera's view of positions.
 
-/// How positions are seen.
+/// How positions are recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Factor on positions (–).
     pub scale: f64,
-    /// Added to x and z (cm).
+    /// Offset of x and z (cm).
     pub offset: [f64; 2],
     /// Roll of the camera (rad).
     pub tilt: f64,
-    /// How late positions are seen (s).
+    /// Delay of the record (s).
     pub delay: f64,
 }
 
@@ -20,7 +20,7 @@ impl Default for View {
 }
 
 impl View {
-    /// The view through `effects`.
+    /// The view under `effects`.
     pub fn new(effects: &[super::Applied]) -> Self {
         let mut view = Self::default();
         for applied in effects.iter().filter(|applied| !applied.is_off()) {
@@ -31,12 +31,12 @@ impl View {
         view
     }
 
-    /// Whether positions are seen as they are.
+    /// True if positions are recorded unchanged.
     pub fn is_plain(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Where a point at x, z (cm) is seen: rolled, scaled, then shifted.
+    /// The recorded position (cm) of a point at x, z (cm): rolled, scaled, then shifted.
     pub fn of(&self, [x, z]: [f64; 2]) -> [f64; 2] {
         let [x, z] = if self.tilt == 0.0 {
             [x, z]

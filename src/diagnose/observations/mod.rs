@@ -226,10 +226,10 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
     };
     let list = explained.iter().map(&words).collect::<Vec<_>>().join("; ");
     let summary = match verdict {
-        Verdict::None => "The nominal model reaches all numbers within two standard deviations.".to_owned(),
-        Verdict::Unexplained => "No single cause and no two constants of the nominal model reach all numbers.".to_owned(),
+        Verdict::None => "The nominal model explains all numbers within two standard deviations.".to_owned(),
+        Verdict::Unexplained => "No single cause and no two constants of the nominal model explain all numbers.".to_owned(),
         _ => format!(
-            "The nominal model misses the numbers; these would reach them, and the numbers cannot tell which it is: {list}."
+            "The nominal model does not explain the numbers; any of these causes would, and the numbers cannot tell which: {list}."
         ),
     };
     let mut ranked: Vec<&Fit> = fits.iter().collect();

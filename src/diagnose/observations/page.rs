@@ -12,8 +12,8 @@ pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
     let Found { diagnosis: d, numbers, explanations } = found;
     let mut out = report::heading(d);
     out.push_str(
-        "<p class=\"small\">Single numbers cannot be split into some to fit and some to judge by: they rule causes out, and say what ties them, but name \
-         none. σ is one standard deviation.</p>\n<h2>The numbers</h2>\n",
+        "<p class=\"small\">Single numbers allow no held-out set: they rule causes out and show which are tied, but identify none. σ is one standard \
+         deviation.</p>\n<h2>The numbers</h2>\n",
     );
     let columns = ["number", "under", "#measured", "#± one σ", "#nominal model", "#off by (σ)"];
     let mut table = Table::new(&[&columns[..], &["#with the best below", "#off by (σ)"]].concat()).stacking();
@@ -33,11 +33,11 @@ pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
         ]);
     }
     out.push_str(&table.html());
-    out.push_str("<h2>What would reach them</h2>\n");
+    out.push_str("<h2>Possible explanations</h2>\n");
     if explanations.is_empty() {
         out.push_str(match d.verdict {
-            Verdict::None => "<p>Nothing has to be added: the nominal model does.</p>\n",
-            _ => "<p>No single cause, and no two constants.</p>\n",
+            Verdict::None => "<p>None is needed: the nominal model explains the numbers.</p>\n",
+            _ => "<p>No single cause and no two constants explain the numbers.</p>\n",
         });
     } else {
         let constants = names::constants(&dataset.robot);
@@ -65,7 +65,9 @@ pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
         } else {
             ""
         };
-        out += &format!("<p class=\"small\">Each of them does it alone; the numbers cannot tell which it is.{two}</p>\n");
+        out += &format!(
+            "<p class=\"small\">Each of them explains the numbers alone; the numbers cannot tell which it is.{two}</p>\n"
+        );
     }
     out.push_str("<h2>All causes tried, one at a time</h2>\n");
     let mut table = Table::new(&["cause, form", "#misfit (σ, rms)"]);

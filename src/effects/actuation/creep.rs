@@ -1,14 +1,24 @@
 //! Domains keep switching slowly after a change of voltage.
 //!
 //! ```text
-//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r) up to T_max,  w_j = c/r·(T_j/1 s)^p
+//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p,  T_j ≤ T_max
 //! ```
 //!
-//! The elements are a Kelvin-Voigt chain. T_max is three times the run's length unless it is given. A run that goes on from a saved state keeps the elements that it began with, whatever its
-//! length; runs of different lengths are of the same robot only where T_max is given.
+//! The elements are a Kelvin-Voigt chain. T_max is three times the run's length unless it is given, so runs of different lengths have the same
+//! elements only where it is; a run that continues from a saved state keeps the elements of that state.
 //!
-//! With p = 0 a step grows by c of itself in every decade of time, with another p by a power law of time. r is the number of elements in a decade; the
-//! usual chain has one, the first at 0.1 s. With r = 0 there is one element of the weight c.
+//! With p = 0 the response to a step grows by the share c per decade of time, with another p by a power law of time. r is the number of elements per
+//! decade; r = 0 is a single element of the weight c.
+//!
+//! # Parameters
+//! * `per_decade` (1/decade): growth c of the step response in the decade about 1 s
+//! * `power` (–): exponent p
+//! * `rungs_per_decade` (–): r; 0 is a single element of the weight c
+//! * `fastest_s` (s): time constant T_0 of the first element
+//! * `slowest_s` (s): largest time constant T_max; 0 is three times the run's length
+//!
+//! # Source
+//! Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
@@ -61,21 +71,26 @@ pub const CREEP: Effect = Effect {
     }),
 };
 
-/// What decides the time constant (s) and weight of every element.
+/// Parameters of the elements, in the equation's symbols.
 #[derive(Debug, Clone, Copy)]
 struct Chain {
+    /// c.
     growth: f64,
+    /// p.
     power: f64,
+    /// r.
     per_decade: f64,
+    /// T_0 (s).
     fastest: f64,
 }
 
 impl Chain {
+    /// T_j (s).
     fn time(&self, element: usize) -> f64 {
         self.fastest * 10_f64.powf(element as f64 / self.per_decade)
     }
 
-    /// The first `count` of them.
+    /// T_j (s) and w_j of the first `count` elements.
     fn elements(&self, count: usize) -> Vec<[f64; 2]> {
         if self.per_decade == 0.0 {
             return vec![[self.fastest, self.growth]];
@@ -84,27 +99,27 @@ impl Chain {
         (0..count).map(element).collect()
     }
 
-    /// Those of time constants up to `slowest` (s), at least the first.
+    /// T_j (s) and w_j of the elements with T_j up to `slowest` (s), at least the first.
     fn up_to(&self, slowest: f64) -> Vec<[f64; 2]> {
-        let more = if self.per_decade == 0.0 { 0 } else { (1..).take_while(|element| self.time(*element) <= slowest).count() };
-        self.elements(1 + more)
+        let others = if self.per_decade == 0.0 { 0 } else { (1..).take_while(|element| self.time(*element) <= slowest).count() };
+        self.elements(1 + others)
     }
 }
 
 struct Creep {
     /// T_j (s) and w_j.
     elements: Vec<[f64; 2]>,
-    /// q_j of every actuator.
+    /// q_j (V), elements × actuators.
     behind: Vec<Vec<f64>>,
     chain: Chain,
     actuators: usize,
 }
 
-/// Most elements that a memory may hold: four in each of 50 decades.
+/// Most elements in a saved state: four in each of 50 decades.
 const MOST_ELEMENTS: f64 = 200.0;
 
 impl SignalStage for Creep {
-    /// What has crept before is part of the settled shape: q_j = V.
+    /// All creep has happened at rest: q_j = V.
     fn settle(&mut self, volts: &mut [f64]) {
         self.behind.iter_mut().for_each(|q| q.copy_from_slice(volts));
         let whole: f64 = self.elements.iter().map(|[_, weight]| weight).sum();
@@ -125,7 +140,7 @@ impl SignalStage for Creep {
         }
     }
 
-    /// The number of elements, then q_j.
+    /// The number of elements, then all q_j.
     fn memory(&self) -> Vec<f64> {
         std::iter::once(self.elements.len() as f64).chain(self.behind.iter().flatten().copied()).collect()
     }
@@ -167,6 +182,7 @@ mod tests {
             assert!((pair[1] - pair[0] - 20.0).abs() < 1.0, "{at:?}");
         }
     }
+
     #[test]
     fn finer_elements_grow_alike_and_a_power_of_time_grows_as_such() {
         let Action::Voltages(make) = CREEP.action else { unreachable!() };

@@ -5,10 +5,29 @@
 //!                        h = Σ w_i (V − p_i),    p_i ← max(V − r_i, min(V + r_i, p_i))                    (Prandtl-Ishlinskii)
 //! ```
 //!
-//! Both depend on the way of the voltage only, not on its rate. `width` is the opening of the loop as a share of a 1500 V stroke. Bouc-Wen: the
-//! opening is 2·h_max, so h_max = 750 V · width, and b, c follow from the asymmetry c/b. Prandtl-Ishlinskii (`plays = 1`): sixteen radii in
-//! geometric series from 30 to 1400 V with weights r^shape·exp(−decay·r); their sum is such that the loop between 0 and 1500 V opens by 1500 V · width at its
-//! middle. The plays begin at the first voltage, or (`from_zero = 1`) have come from 0 V to it. g is 1 in the plain forms: which slope of a loop is called its gain is a convention.
+//! Both are independent of rate. `width` is the opening of the loop as a share of a 1500 V stroke.
+//!
+//! Bouc-Wen: the opening is 2·h_max, so h_max = 750 V · width; b and c follow from A, h_max and the asymmetry c/b.
+//!
+//! Prandtl-Ishlinskii (`plays = 1`): sixteen radii in geometric series from 30 to 1400 V with weights r^shape·exp(−decay·r), scaled so that the loop
+//! between 0 and 1500 V opens by 1500 V · width at its middle. The plays start at rest at the first voltage, or (`from_zero = 1`) have come to it
+//! from 0 V.
+//!
+//! g is the slope that is called the loop's gain, a convention.
+//!
+//! # Parameters
+//! * `width` (–): opening of the loop as a share of a 1500 V stroke
+//! * `slope_loss` (–): A: loss of gain at a turning point (Bouc-Wen)
+//! * `asymmetry` (–): c/b (Bouc-Wen)
+//! * `exponent` (–): n (Bouc-Wen)
+//! * `plays` (–): 0: Bouc-Wen; 1: Prandtl-Ishlinskii, with width, shape, decay_per_kv and from_zero
+//! * `shape` (–): exponent of the radius in the plays' weights (Prandtl-Ishlinskii)
+//! * `gain` (–): gain g of the loop
+//! * `from_zero` (–): 1: the plays have come to the first voltage from 0 V; 0: they start at rest there (Prandtl-Ishlinskii)
+//! * `decay_per_kv` (1/kV): exponential decay of the plays' weights with the radius (Prandtl-Ishlinskii)
+//!
+//! # Source
+//! Data sheet of the MFC actuator (width about 0.2); asymmetric loops: Fu et al., Sens. Actuators A 346 (2022) 113830.
 
 use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 
@@ -52,23 +71,16 @@ pub const HYSTERESIS: Effect = Effect {
             bounds: [-2.0, 2.0],
             off: None,
             default: Some(0.0),
-            about: "power of the radius that the weights of the plays go with (Prandtl-Ishlinskii)",
+            about: "exponent of the radius in the plays' weights (Prandtl-Ishlinskii)",
         },
-        Parameter {
-            name: "gain",
-            unit: "",
-            bounds: [0.5, 2.0],
-            off: None,
-            default: Some(1.0),
-            about: "g: slope that goes with the loop",
-        },
+        Parameter { name: "gain", unit: "", bounds: [0.5, 2.0], off: None, default: Some(1.0), about: "gain g of the loop" },
         Parameter {
             name: "from_zero",
             unit: "",
             bounds: [0.0, 1.0],
             off: None,
             default: Some(0.0),
-            about: "1: the plays have come from 0 V to the first voltage; 0: they are at rest there (Prandtl-Ishlinskii)",
+            about: "1: the plays have come to the first voltage from 0 V; 0: they start at rest there (Prandtl-Ishlinskii)",
         },
         Parameter {
             name: "decay_per_kv",
@@ -76,27 +88,32 @@ pub const HYSTERESIS: Effect = Effect {
             bounds: [0.0, 20.0],
             off: None,
             default: Some(0.0),
-            about: "how fast the weights of the plays fall with the radius beside that power (Prandtl-Ishlinskii)",
+            about: "exponential decay of the plays' weights with the radius (Prandtl-Ishlinskii)",
         },
     ],
     action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p, n)) }),
 };
 
-/// Stroke that the width is a share of (V).
+/// Stroke to which the width refers (V).
 const STROKE: f64 = 1500.0;
-/// The state changes by at most this share of its limit in a substep.
+/// Largest change of the state in a substep, as a share of its limit.
 const LARGEST_PART: f64 = 0.05;
 
 struct BoucWen {
+    /// A.
     slope: f64,
     /// b and c times h_max^n, so that the state is a share of h_max.
     b: f64,
     c: f64,
+    /// n.
     exponent: f64,
+    /// h_max (V).
     limit: f64,
+    /// g.
     gain: f64,
+    /// V of every actuator (V).
     volts: Vec<f64>,
-    /// h/h_max.
+    /// h/h_max of every actuator.
     state: Vec<f64>,
 }
 
@@ -116,7 +133,7 @@ impl BoucWen {
         }
     }
 
-    /// dh/dV at the share `h` for a voltage that changes in the direction `sign`.
+    /// dh/dV at the state `h` for a voltage that changes in the direction `sign`.
     fn rate(&self, h: f64, sign: f64) -> f64 {
         let power = h.abs().powf(self.exponent);
         self.slope - self.b * sign * power.copysign(h) - self.c * power
@@ -137,11 +154,11 @@ impl SignalStage for BoucWen {
             let parts = (change.abs() * self.slope / LARGEST_PART).ceil();
             let (by, sign) = (change / parts, change.signum());
             let mut h = self.state[i];
-            // Runge's midpoint rule: of second order, and the parts are small.
+            // Midpoint rule, of second order.
             for _ in 0..parts as u64 {
                 let half = h + 0.5 * by * self.rate(h, sign);
                 let next = h + by * self.rate(half, sign);
-                // At its limit the state stays, however far the voltage goes: it gets there in some 40/LARGEST_PART parts.
+                // The limit, which takes some 40/LARGEST_PART parts to reach, however far the voltage goes.
                 if next == h {
                     break;
                 }
@@ -163,18 +180,23 @@ impl SignalStage for BoucWen {
     }
 }
 
+/// Number of plays.
 const RADII: usize = 16;
 
+/// Radius of play `i` (V).
 fn radius(i: usize) -> f64 {
     30.0 * (1400.0_f64 / 30.0).powf(i as f64 / (RADII - 1) as f64)
 }
 
 struct Plays {
+    /// w_i.
     weights: [f64; RADII],
+    /// r_i (V).
     radii: [f64; RADII],
+    /// g.
     gain: f64,
     from_zero: bool,
-    /// p_i of every actuator, one after the other.
+    /// p_i (V), actuators × plays.
     plays: Vec<f64>,
 }
 
@@ -243,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loop_opens_as_wide_as_asked_at_any_rate() {
+    fn the_opening_of_the_loop_is_the_width_at_any_rate() {
         for step in [1.0, 15.0] {
             // With a steep slope the Bouc-Wen state is at its limit half way.
             let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3], 1), step);
@@ -266,7 +288,6 @@ mod tests {
                         hysteresis.pass(1e-4, &mut [sign * volts]);
                         assert!((hysteresis.state[0] - sign).abs() < 1e-14, "{width} {volts}: {}", hysteresis.state[0]);
                     }
-                    // Seen: 0.1 ms.
                     assert!(start.elapsed().as_millis() < 200, "{width} {volts}: {:?}", start.elapsed());
                 }
             }

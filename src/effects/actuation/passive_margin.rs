@@ -3,6 +3,12 @@
 //! ```text
 //! γ(s) = γ for p·L/2 < s < L − p·L/2, else 0; joint i gets its share of active length
 //! ```
+//!
+//! # Parameters
+//! * `fraction` (–): share p of an actuator’s length that is passive, half of it at each end
+//!
+//! # Source
+//! Geometry of the M-8514 patch, by inference; derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

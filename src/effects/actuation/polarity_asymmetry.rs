@@ -3,6 +3,12 @@
 //! ```text
 //! θ_V = −γ·ℓ·r·V for V > 0, −γ·ℓ·V otherwise
 //! ```
+//!
+//! # Parameters
+//! * `ratio` (–): gain r of positive voltages, on top of positive_gain
+//!
+//! # Source
+//! The reference's constant 1.733; asymmetry: nonlinear equivalent piezoelectric coefficient of MFCs, 2016.
 
 use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 

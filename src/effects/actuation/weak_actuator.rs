@@ -3,6 +3,13 @@
 //! ```text
 //! θ_V = −s·γ·ℓ·V for the joints of one actuator
 //! ```
+//!
+//! # Parameters
+//! * `actuator` (–): the actuator, from 1
+//! * `gain` (–): remaining gain
+//!
+//! # Source
+//! From general knowledge.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 
@@ -15,14 +22,7 @@ pub const WEAK_ACTUATOR: Effect = Effect {
     source: "From general knowledge.",
     parameters: &[
         Parameter { name: "actuator", unit: "", bounds: [1.0, 1e4], off: None, default: None, about: "the actuator, from 1" },
-        Parameter {
-            name: "gain",
-            unit: "",
-            bounds: [0.0, 1.5],
-            off: Some(1.0),
-            default: None,
-            about: "what is left of its gain",
-        },
+        Parameter { name: "gain", unit: "", bounds: [0.0, 1.5], off: Some(1.0), default: None, about: "remaining gain" },
     ],
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);

@@ -3,6 +3,12 @@
 //! ```text
 //! θ_V = −s·γ·ℓ·V
 //! ```
+//!
+//! # Parameters
+//! * `scale` (–): factor s on the curvature per volt
+//!
+//! # Source
+//! Free strain: Williams, thesis, 2004; shear lag in the bond: Crawley and de Luis 1987.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

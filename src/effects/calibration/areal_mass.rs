@@ -3,6 +3,12 @@
 //! ```text
 //! M = s·μ_A·w·L
 //! ```
+//!
+//! # Parameters
+//! * `scale` (–): factor s on the mass of every link
+//!
+//! # Source
+//! Derived; data sheet of the MFC actuator, Smart Material Corp.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -3,6 +3,12 @@
 //! ```text
 //! τ = −k·(θ − θ_V + s·η·θ̇)
 //! ```
+//!
+//! # Parameters
+//! * `scale` (–): factor s on the damping time η
+//!
+//! # Source
+//! Derived from eq. 1; damping from a step response: Zheng et al., ICRA 2022.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -1,4 +1,4 @@
-//! Constants of the nominal model that are off by a factor.
+//! Constants of the nominal model, changed by a factor.
 
 mod actuation_gain;
 mod areal_mass;

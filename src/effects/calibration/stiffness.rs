@@ -3,6 +3,12 @@
 //! ```text
 //! τ = −s·k·(θ − θ_V + η·θ̇)
 //! ```
+//!
+//! # Parameters
+//! * `scale` (–): factor s on the stiffness k
+//!
+//! # Source
+//! Derived from eq. 1; spread of MFC parameters: Hu, Smith, Hays, Oates, CDC-ECC 2011.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -3,6 +3,12 @@
 //! ```text
 //! T·dV_a/dt + V_a = V_c,  T = R·C
 //! ```
+//!
+//! # Parameters
+//! * `time_constant_s` (s): time constant T
+//!
+//! # Source
+//! Capacitance per area: data sheet of the MFC actuator; derived.
 
 use super::follower::{Follower, Law};
 use crate::effects::{Action, Effect, Kind, Parameter};

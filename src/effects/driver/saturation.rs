@@ -3,6 +3,13 @@
 //! ```text
 //! V_a = min(V_hi, max(V_lo, V_c))
 //! ```
+//!
+//! # Parameters
+//! * `max_v` (V): largest voltage V_hi
+//! * `min_v` (V): least voltage V_lo
+//!
+//! # Source
+//! Limits of the MFC actuator: data sheet, Smart Material Corp.
 
 use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
 

@@ -3,6 +3,12 @@
 //! ```text
 //! |dV_a/dt| ≤ S, otherwise V_a = V_c
 //! ```
+//!
+//! # Parameters
+//! * `rate_v_per_s` (V/s): largest rate S
+//!
+//! # Source
+//! Derived: S = I_max/C.
 
 use super::follower::{Follower, Law};
 use crate::effects::{Action, Effect, Kind, Parameter};

@@ -3,6 +3,12 @@
 //! ```text
 //! V_a(t) = V_c(t − T)
 //! ```
+//!
+//! # Parameters
+//! * `delay_s` (s): delay T
+//!
+//! # Source
+//! Derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

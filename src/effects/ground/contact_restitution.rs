@@ -4,8 +4,14 @@
 //! v⁺ = −e·v⁻, from 0.2 cm/s on
 //! ```
 //!
-//! Bullet's v⁻ holds what loads add to it within the step. A foot that bears N dyn chatters unless N·h/m, with the mass m that it
-//! moves, stays below 0.2 cm/s; the planar engine reflects the speed at the beginning of the step.
+//! Bullet's v⁻ includes the change by loads within the step, so a foot of mass m (g) under N (dyn) chatters unless N·h/m is below 0.2 cm/s. The
+//! planar engine reflects the speed at the beginning of the step.
+//!
+//! # Parameters
+//! * `restitution` (–): share e of the approach speed that is returned
+//!
+//! # Source
+//! Newton's law of impact; the threshold is Bullet's.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

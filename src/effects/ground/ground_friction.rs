@@ -3,6 +3,12 @@
 //! ```text
 //! |F_t| ≤ s·μ_link·μ_ground·N
 //! ```
+//!
+//! # Parameters
+//! * `scale` (–): factor s on the coefficients
+//!
+//! # Source
+//! The reference and Bullet: the product of two coefficients, at most 10.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -3,6 +3,12 @@
 //! ```text
 //! gravity (−g·sin α, −g·cos α) in the ground's axes
 //! ```
+//!
+//! # Parameters
+//! * `angle_deg` (°): slope α, positive uphill along +x
+//!
+//! # Source
+//! Derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -1,4 +1,4 @@
-//! Between robot and floor.
+//! Contact between robot and ground.
 
 mod contact_restitution;
 mod ground_friction;

@@ -3,6 +3,14 @@
 //! ```text
 //! F = −(μ_c + (μ_s − μ_c)·exp(−(v/v_s)²))·N·sgn(v) − F_v·v
 //! ```
+//!
+//! # Parameters
+//! * `static_ratio` (–): static over sliding friction
+//! * `stribeck_speed_mm_s` (mm/s): speed v_s
+//! * `viscous_mn_s_per_m` (mN·s/m): viscous force F_v per speed and link on the floor
+//!
+//! # Source
+//! Stribeck friction: Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 use crate::model::StickSlip;

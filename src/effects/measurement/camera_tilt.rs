@@ -3,6 +3,12 @@
 //! ```text
 //! x_m = x·cos ψ − z·sin ψ,  z_m = x·sin ψ + z·cos ψ
 //! ```
+//!
+//! # Parameters
+//! * `angle_deg` (°): roll ψ
+//!
+//! # Source
+//! Derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -1,4 +1,4 @@
-//! Between the robot and what is recorded of it. Seen positions are rolled, scaled, then shifted, and late.
+//! Between the robot and its record: positions are delayed, rolled, scaled, then shifted.
 
 mod camera_tilt;
 mod sensor_delay;

@@ -3,6 +3,12 @@
 //! ```text
 //! y_m(t) = y(t − T)
 //! ```
+//!
+//! # Parameters
+//! * `delay_s` (s): delay T
+//!
+//! # Source
+//! Derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

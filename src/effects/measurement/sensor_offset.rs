@@ -3,6 +3,13 @@
 //! ```text
 //! y_m = y + y₀
 //! ```
+//!
+//! # Parameters
+//! * `x_mm` (mm): added to x
+//! * `z_mm` (mm): added to z
+//!
+//! # Source
+//! From general knowledge.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

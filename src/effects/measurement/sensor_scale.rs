@@ -3,6 +3,12 @@
 //! ```text
 //! y_m = s·y
 //! ```
+//!
+//! # Parameters
+//! * `scale` (–): factor s on positions
+//!
+//! # Source
+//! From general knowledge.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

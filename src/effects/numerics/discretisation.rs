@@ -3,6 +3,13 @@
 //! ```text
 //! y(m, h) = y_∞ + a/m² + b·h^p
 //! ```
+//!
+//! # Parameters
+//! * `motors_per_actuator` (–): joints per actuator in place of the file’s; 0: the file’s
+//! * `time_step_scale` (–): factor on the time step
+//!
+//! # Source
+//! Derived: the chain against the Euler-Bernoulli beam.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -1,4 +1,4 @@
-//! The chain and the step in place of a continuum.
+//! Discretisation in space and time.
 
 mod discretisation;
 

@@ -3,6 +3,12 @@
 //! ```text
 //! f = −½·ρ·C_d·w·v·|v|,  v normal to the sheet
 //! ```
+//!
+//! # Parameters
+//! * `drag_coefficient` (–): drag coefficient C_d
+//!
+//! # Source
+//! Textbook drag of a plate; sizes derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -3,6 +3,12 @@
 //! ```text
 //! φ = c·M_root
 //! ```
+//!
+//! # Parameters
+//! * `compliance_rad_per_n_m` (rad/(N·m)): turn c of the root per moment
+//!
+//! # Source
+//! J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -3,6 +3,12 @@
 //! ```text
 //! τ = −k·(θ − θ_V + η·θ̇) − τ_c·tanh(θ̇/ω_ε)
 //! ```
+//!
+//! # Parameters
+//! * `moment_mn_m` (mN·m): the moment τ_c in every joint
+//!
+//! # Source
+//! Symptoms: Worden and Tomlinson, Nonlinearity in Structural Dynamics, 2001; Kerschen et al. 2006.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

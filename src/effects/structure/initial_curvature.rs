@@ -3,6 +3,13 @@
 //! ```text
 //! τ = −k·(θ − θ_V − κ₀·ℓ + η·θ̇)
 //! ```
+//!
+//! # Parameters
+//! * `curvature_per_m` (1/m): curvature κ₀; positive bends the right end down
+//! * `actuator` (–): the actuator, from 1; 0: all of them
+//!
+//! # Source
+//! Cure temperature: Smart Material FAQ; equation derived.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

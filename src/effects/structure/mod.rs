@@ -1,4 +1,4 @@
-//! What holds the sheet, what sits on it, and how it bends.
+//! Mounting and structure: clamp, added mass, shape, stiffness and losses.
 
 mod air_drag;
 mod clamp_compliance;

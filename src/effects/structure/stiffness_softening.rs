@@ -3,6 +3,12 @@
 //! ```text
 //! τ = −k·(δ·(1 − a·(δ/ℓ)²) + η·θ̇),  δ = θ − θ_V,  bracket at least 0.5
 //! ```
+//!
+//! # Parameters
+//! * `softening_mm2` (mm²): the factor a
+//!
+//! # Source
+//! Tan and Erturk, doi:10.1117/12.2301000; cubic form from general knowledge.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

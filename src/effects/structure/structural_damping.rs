@@ -3,6 +3,12 @@
 //! ```text
 //! τ = −k·(θ − θ_V + η·θ̇ + ξ·Σ q_j),  q̇_j = θ̇ − q_j/T_j,  T_j = 10^j s,  loss factor 0.68·ξ
 //! ```
+//!
+//! # Parameters
+//! * `loss_factor` (–): loss factor η_h; the damping ratio is half of it
+//!
+//! # Source
+//! Derived: a ladder of relaxations with log-uniform times.
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 

@@ -3,6 +3,13 @@
 //! ```text
 //! Δf/f ≈ −(m_a/2M)·φ(s)²,  −2·m_a/M at the tip of a cantilever
 //! ```
+//!
+//! # Parameters
+//! * `mass_g` (g): the mass
+//! * `position_mm` (mm): distance from the left end along the sheet; by default the right end
+//!
+//! # Source
+//! Derived (Rayleigh quotient).
 
 use crate::effects::{Action, Effect, Kind, Parameter};
 use crate::model::PointMass;
