@@ -1,6 +1,6 @@
 //! Texts of messages: numbers, units of names, suggestions for unknown names, and parser errors in plain English.
 
-/// Suffixes of names and their units; a suffix stands before those that it ends in.
+/// Suffixes of names and their units; a longer suffix precedes those that it ends in.
 const UNITS: [(&str, &str); 16] = [
     ("_mm_per_s", "mm/s"),
     ("_v_per_s", "V/s"),

@@ -97,7 +97,7 @@ fn run_script(script: &str, mut spec: Value, python: &Path) -> Result<(Recording
     let failed = |stderr: String| CrosscheckError::Failed { python: python.into(), status: output.status.to_string(), stderr };
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
-        // PyBullet says when it was built, whatever happens.
+        // PyBullet always prints its build time.
         let last = text.lines().rfind(|line| !line.trim().is_empty() && !line.contains("build time")).unwrap_or("no message");
         return Err(failed(last.to_owned()));
     }

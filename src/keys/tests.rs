@@ -73,7 +73,7 @@ fn bases() -> Vec<(String, String)> {
     bases
 }
 
-/// The experiment of a base with a setting, after taking out what would contradict it.
+/// The experiment of a base with a setting, without the key that contradicts it.
 fn with(base: &str, key: &str, value: &str) -> Result<Experiment, ConfigError> {
     let rival = match key {
         "drive.frequency_hz" => "period_s",
@@ -96,7 +96,7 @@ fn same(a: &Experiment, b: &Experiment) -> bool {
     spec(a) == spec(b)
 }
 
-/// Tables of experiment files whose keys have a place of their own.
+/// Tables of experiment files with a fixed path.
 const PLACED: [&Section; 5] =
     [&experiment::MATERIAL, &experiment::ROBOT, &experiment::FRICTION, &experiment::DRIVE, &experiment::SIMULATION];
 
@@ -212,7 +212,7 @@ fn the_choices_listed_are_those_accepted() {
 
 #[test]
 fn the_ranges_stated_are_those_that_the_program_keeps_to() {
-    // Inside and outside of each range; a value inside may still be refused for what it does to the rest.
+    // Inside and outside of each range; a value inside may still be refused in combination with others.
     let numbers = |range: Range| -> (Vec<f64>, Vec<f64>) {
         match range {
             Range::Any => (vec![0.0, 3.0, -3.0], vec![]),

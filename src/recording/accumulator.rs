@@ -93,6 +93,7 @@ fn whole_periods(time: f64, period: f64) -> f64 {
 }
 
 impl MeasureAccumulator {
+    /// An accumulator without samples.
     pub fn new(plan: SamplingPlan) -> Self {
         let plan = SamplingPlan { period: plan.period.filter(|&period| period > 0.0), ..plan };
         let kind = if plan.mount == Mount::Clamped {

@@ -20,6 +20,7 @@ const SETS: [(&str, &str); 2] = [("set 2", "material.preset=parameter-2"), ("set
 const SPOTS_HZ: [f64; 4] = [5.0, 15.0, 25.0, 40.0];
 const SPOTS_STEP: f64 = 5e-6;
 
+/// Static shapes of the cantilever.
 pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
     let mut figure = Figure::new("Static shapes of the cantilever", "x (mm)", "z (mm)");
@@ -70,6 +71,7 @@ fn arc_end(deflection: f64) -> f64 {
     length * angle.sin() / angle
 }
 
+/// Frequency response of the cantilever.
 pub fn response(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
     let mut figure = Figure::new("Frequency response of the cantilever", "frequency (Hz)", "tip amplitude (mm)");
@@ -145,6 +147,7 @@ fn compare_resonance(findings: &mut Findings, chain: &str, response: &[(f64, f64
     findings.compare(&format!("resonance, {chain}"), "25 Hz (simulated, m ≥ 3), 23 Hz (measured)", ours, difference, explanation);
 }
 
+/// Damping from the step response.
 pub fn damping(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
     let mut figure = Figure::new("Step response of the cantilever", "time (ms)", "height of the tip (mm)");

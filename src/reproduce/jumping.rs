@@ -82,6 +82,7 @@ fn beside_measured(height: f64) -> String {
     }
 }
 
+/// In-place jumping at 14 Hz.
 pub fn at_14_hz(bench: &Bench) -> Result<Findings, StudyError> {
     let (_, recording, measures) = jump(bench, false)?;
     let (there, spot_recording, spot) = jump(bench, true)?;
@@ -153,6 +154,7 @@ fn draw_jump(findings: &mut Findings, recording: &Recording) {
         .into();
 }
 
+/// The three key shapes at 14 Hz.
 pub fn key_shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let (_, recording, _) = jump(bench, false)?;
     let (there, spot_recording, _) = jump(bench, true)?;
@@ -209,6 +211,7 @@ fn best_moments(recording: &Recording) -> [(ContactState, Option<usize>); 3] {
     ]
 }
 
+/// Jump height against frequency.
 pub fn over_frequency(bench: &Bench) -> Result<Findings, StudyError> {
     let settings = [REAL[0], REAL[1], RECORDS];
     let (sweep, points) = bench.sweep("jump-frequency", "jump-frequency-scan", &settings)?;
@@ -267,6 +270,7 @@ fn compare_tops(findings: &mut Findings, theirs: &[(f64, f64)], common: &[(f64, 
     );
 }
 
+/// Jump height against on-time.
 pub fn over_on_time(bench: &Bench) -> Result<Findings, StudyError> {
     let mut sweep = Sweep::open("preset:jump-on-time-scan".as_ref(), &[ON_TIME_RECORDS.into()])?;
     sweep.measures = vec!["recorded_jump_height_mm".into(), "jump_height_mm".into()];

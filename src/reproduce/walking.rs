@@ -22,6 +22,7 @@ const FORWARD_TO_HZ: i32 = 3;
 /// Measured speeds: frequency (Hz), speed (mm/s).
 const SPEEDS: [(f64, f64); 2] = [(8.0, -7.0), (14.0, 12.0)];
 
+/// Static shapes of the five-actuator robot.
 pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     let mut findings = Findings::default();
     let mut figure = Figure::new("Static shapes of the five-actuator robot", "x (mm)", "z (mm)");
@@ -58,6 +59,7 @@ pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
     Ok(findings)
 }
 
+/// Inchworm motion over five cycles.
 pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     let (_, run) = bench.run("inchworm-1hz", Some("stride_mm"), &[])?;
     let r = &run.recording;
@@ -95,6 +97,7 @@ pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     Ok(findings)
 }
 
+/// Speed against frequency.
 pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
     let (sweep, points) = bench.sweep("speed", "speed-frequency-scan", &REAL)?;
     let speeds = curve(&sweep, &points, sweep.axes.len() - 1, 0);

@@ -304,7 +304,7 @@ fn points(axes: &[Axis]) -> Option<usize> {
     points.filter(|points| *points <= MAX_POINTS)
 }
 
-/// A list of values, or a range of evenly spaced ones whose ends are exact.
+/// A list of values, or a range of evenly spaced values with exact ends.
 fn axis(values: &Value) -> Result<Vec<Value>, String> {
     let list = match values {
         Value::Array(list) => list.clone(),

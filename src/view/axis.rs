@@ -27,14 +27,17 @@ impl Scale {
         (self.low, self.high) = (low, low + range);
     }
 
+    /// Sets the range of the page (pt).
     pub fn place(&mut self, from: f64, to: f64) {
         (self.from, self.to) = (from, to);
     }
 
+    /// Position of a value on the page (pt).
     pub fn at(&self, value: f64) -> f64 {
         self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
     }
 
+    /// Length of the range of values.
     pub fn range(&self) -> f64 {
         self.high - self.low
     }

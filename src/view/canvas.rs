@@ -86,6 +86,7 @@ impl Canvas {
         );
     }
 
+    /// Adds a line of a width (pt).
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), colour: &str, width: f64) {
         let _ = writeln!(
             self.out,
@@ -150,10 +151,12 @@ pub(super) struct Area {
 }
 
 impl Area {
+    /// Width (pt).
     pub fn width(self) -> f64 {
         self.right - self.left
     }
 
+    /// Height (pt).
     pub fn height(self) -> f64 {
         self.bottom - self.top
     }

@@ -64,6 +64,7 @@ impl Key {
         Self { label: label.into(), low, high, missing }
     }
 
+    /// Position of a value on the scale, from 0 to 1.
     pub fn share(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
@@ -143,6 +144,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
+    /// Draws the cells.
     pub fn draw(&self, out: &mut String, area: Area) {
         let (columns, rows) = (self.x.texts.len().max(1), self.y.texts.len().max(1));
         let (wide, high) = (area.width() / columns as f64, area.height() / rows as f64);

@@ -43,10 +43,12 @@ pub(super) struct Panel {
 }
 
 impl Panel {
+    /// An empty panel with a height of `share` times its width.
     pub fn new(y_label: &str, share: f64) -> Self {
         Self { y_label: y_label.into(), y_numbers: true, share, ..Self::default() }
     }
 
+    /// Series with a label.
     pub fn labelled(&self) -> impl Iterator<Item = &Series> {
         self.series.iter().filter(|s| !s.label.is_empty())
     }
@@ -56,16 +58,19 @@ impl Panel {
         self.end_labels || self.labelled().count() > STYLES
     }
 
+    /// Points of all series that can be drawn.
     pub fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         self.series.iter().flat_map(|s| &s.points).copied().filter(|p| shown(*p))
     }
 
+    /// Values that the x axis covers.
     pub fn x_values(&self) -> impl Iterator<Item = f64> {
         let lanes = self.lanes.iter().flat_map(|lane| &lane.points).copied().filter(|p| shown(*p));
         let cells = self.cells.iter().flat_map(|cells| [0.0, cells.x.texts.len() as f64]);
         self.points().chain(lanes).map(|p| p.0).chain(cells)
     }
 
+    /// Values that the y axis covers.
     pub fn y_values(&self) -> impl Iterator<Item = f64> {
         let notes = self.notes.iter().filter(|note| shown((note.0, note.1))).map(|note| note.1);
         let cells = self.cells.iter().flat_map(|cells| [0.0, cells.y.texts.len() as f64]);

@@ -65,11 +65,13 @@ pub(super) struct Style {
 }
 
 impl Style {
+    /// One of the five styles; `sparse`: with some markers along lines.
     pub fn of(index: usize, sparse: bool) -> Self {
         let index = index % STYLES;
         Self { index, colour: COLOURS[index].into(), dash: DASHES[index], width: 1.1, sparse }
     }
 
+    /// A solid line of a colour and width (pt).
     pub fn solid(colour: &str, width: f64) -> Self {
         Self { index: 0, colour: colour.into(), dash: "", width, sparse: false }
     }
@@ -107,6 +109,7 @@ impl Style {
 }
 
 impl Series {
+    /// Draws the series; `place`, from 0 to 1, shifts sparse markers.
     pub fn draw(&self, out: &mut String, x: &Scale, y: &Scale, style: &Style, place: f64) {
         // z of a recording is the height of the centre line above its height on the flat robot, drawn as the lower face.
         let lift = if matches!(self.look, Look::Robot { .. }) { ROBOT / 2.0 } else { 0.0 };

@@ -32,6 +32,7 @@ pub(super) struct Clamped {
 }
 
 impl Clamped {
+    /// Empty sums.
     pub(super) fn new(plan: &SamplingPlan) -> Self {
         let period = plan.period;
         let half = period.and_then(|period| Some((plan.resolved_half(period)?, period)));

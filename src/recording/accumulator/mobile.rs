@@ -42,6 +42,7 @@ struct Start {
 }
 
 impl Mobile {
+    /// Empty sums.
     pub(super) fn new(plan: &SamplingPlan) -> Self {
         let period = plan.period;
         let half = period.and_then(|period| Some((plan.resolved_half(period)?, period)));

@@ -27,6 +27,7 @@ impl<'a> Layout<'a> {
         top + 0.3 * self.size
     }
 
+    /// The SVG document.
     pub(super) fn draw(mut self) -> String {
         let (size, figure) = (self.size, self.figure);
         let mut canvas = Canvas::default();

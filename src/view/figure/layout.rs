@@ -36,6 +36,7 @@ pub(super) struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
+    /// Computes the layout of a figure.
     pub(super) fn of(figure: &'a Figure) -> Self {
         let (size, width) = (figure.size.font_pt, figure.size.width());
         let labels = figure.shared_labels();
@@ -136,6 +137,7 @@ impl<'a> Layout<'a> {
         self.left = left.max(self.left.min(left + 0.1)).max(1.6 * self.size);
     }
 
+    /// Number of rows of panels.
     pub(super) fn rows(&self) -> usize {
         self.figure.panels.len().div_ceil(self.columns)
     }
