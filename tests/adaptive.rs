@@ -160,7 +160,7 @@ fn measures_of_periods_do_not_depend_on_how_a_run_is_stepped() {
 }
 
 #[test]
-fn records_are_as_far_apart_as_asked() {
+fn records_are_as_far_apart_as_record_every_s_says() {
     let every = 2.0 / 1920.0;
     let spaced = |duration: &str| {
         let settings = [&format!("simulation.record_every_s={every}"), duration, "simulation.step_measure=jump_height_mm"];

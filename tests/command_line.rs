@@ -522,7 +522,7 @@ fn strides_that_another_step_changes_get_no_verdict() {
     assert!(out(&judged).contains("no verdict") && out(&judged).contains("with another step"), "{}", out(&judged));
 }
 
-/// Coulomb's law, solved, walks as Bullet does at that step; and where records are as far apart as the step its error is that to half the step.
+/// With Coulomb's law solved, strides are Bullet's at that step; and where records are as far apart as the step its error is that to half the step.
 #[test]
 fn strides_on_rough_films_agree_at_long_steps_and_their_error_is_never_that_of_the_same_step() {
     let bench = Bench::new(CANTILEVER);

@@ -4,9 +4,9 @@ mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use common::{pages, sfers};
+use common::{pages, sfers, tools};
 use serde_json::Value;
 
 fn sample(name: &str) -> PathBuf {
@@ -26,6 +26,7 @@ fn ids(diagnosis: &Value) -> Vec<&str> {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn the_sample_with_a_tip_mass_is_named_and_leaves_what_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let d = diagnosed(folder.path(), "sample-tip-mass");
@@ -120,6 +121,7 @@ fn check_report(page: &str, d: &Value, extended: &str) {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn the_samples_with_hysteresis_and_with_nothing_are_told_apart() {
     let folder = tempfile::tempdir().unwrap();
     let d = diagnosed(folder.path(), "sample-hysteresis");
@@ -143,11 +145,13 @@ fn the_samples_with_hysteresis_and_with_nothing_are_told_apart() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn the_report_opens_in_a_browser_without_a_complaint() {
+    let Some(mut chromium) = tools::chromium("the_report_opens_in_a_browser_without_a_complaint") else { return };
     let folder = tempfile::tempdir().unwrap();
     diagnosed(folder.path(), "sample-nothing-hidden");
     let page = folder.path().join("d/report.html");
-    let output = Command::new("chromium")
+    let output = chromium
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"])
         .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
         .arg(format!("file://{}", page.display()))
@@ -284,6 +288,7 @@ fn thinned(folder: &Path, name: &str, runs: [&str; 2], step: usize, rows: usize,
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn a_cause_whose_range_reaches_where_it_does_nothing_is_not_named() {
     let folder = tempfile::tempdir().unwrap();
     // 400 V at 18 Hz and 7 Hz, seen half way: loops of 3 % and a gain do as well as none.

@@ -1,4 +1,4 @@
-//! The books of energy: they close where the physics is known, and they notice the kick that Bullet's contact gives.
+//! The energy audit: it closes where the physics is known, and it notices the kick that Bullet's contact gives.
 
 use sfers::engine::{ENERGY_TOLERANCE, EnergyBalance};
 use sfers::experiment::{self, Control, Experiment, Run, Source, presets};
@@ -25,7 +25,7 @@ fn a_free_robot_turns_height_into_speed() {
     let experiment = experiment_of(text, &[]);
     let energy = run(&experiment).energy;
     let mass: f64 = experiment.robot.segments().iter().map(|segment| segment.mass).sum();
-    // Books are read before step 5000, at 0.05 s: m g² t²/2.
+    // The audit is of before step 5000, at 0.05 s: m g² t²/2.
     let expected = 0.5 * mass * (980.0_f64 * 0.05).powi(2);
     assert!((energy.kinetic_erg / expected - 1.0).abs() < 1e-9, "{energy:?}");
     // Semi-implicit Euler falls farther than t² g/2 by the share Δt/t = 2e-4.
@@ -47,7 +47,7 @@ fn a_cantilever_without_weight_stores_half_of_the_work_and_burns_the_other() {
 
 /// The part that nothing supplied comes from the scheme, which is of first order: it halves with the step.
 #[test]
-fn what_does_not_close_shrinks_with_the_step() {
+fn the_audits_error_is_of_first_order_in_the_step() {
     let error = |step: &str| {
         balance("cantilever-step", &[&format!("simulation.time_step_s={step}"), "simulation.duration_s=0.1"]).error()
     };
@@ -56,7 +56,8 @@ fn what_does_not_close_shrinks_with_the_step() {
 }
 
 #[test]
-fn every_preset_keeps_its_books_in_order() {
+#[ignore = "slow: run by scripts/test.sh"]
+fn no_preset_gains_energy_beyond_half_the_tolerance() {
     for preset in presets::PRESETS {
         let energy = balance(preset.name, &["simulation.duration_s=0.12", "simulation.record_every_s=0.01"]);
         assert!(energy.fault.is_none() && energy.error() < 0.5 * ENERGY_TOLERANCE, "{}: {energy:?}", preset.name);
@@ -65,6 +66,7 @@ fn every_preset_keeps_its_books_in_order() {
 
 /// The inchworm sequence at 10 Hz with smooth body and sticky ends: at about 0.28 s contact throws the robot 30 cm up.
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn the_kick_at_10_hz_is_noticed_with_its_time_and_link_at_any_step() {
     for step in ["2e-5", "5e-6"] {
         let settings = [

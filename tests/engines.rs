@@ -39,6 +39,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// Over the step response the planar engine tends with h² to the limit that Bullet tends to with h.
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn angles_of_the_step_response_converge_to_bullets_limit() {
     let robot = preset("cantilever-step", &[]).robot;
     let duration = 0.5;
@@ -71,6 +72,7 @@ fn the_static_tip_is_bullets() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn the_frequency_response_is_bullets() {
     for frequency in [1.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0_f64] {
         // Long enough for the transient to die: e^(−ζω t) with ζω = 8/s. Bullet's error is of first order: taken out.
@@ -94,6 +96,7 @@ fn the_frequency_response_is_bullets() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn jumps_and_strides_are_bullets() {
     let jump = |engine: &str| {
         let settings = [
@@ -136,6 +139,7 @@ fn jumps_and_strides_are_bullets() {
 
 /// With Coulomb's law steps of 10⁻⁴ s do for a gait on films of friction 4, where the convex model needs 10⁻⁶ s.
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn coulomb_friction_walks_as_bullet_does_at_long_steps() {
     let speed = |engine: &[&str]| {
         let settings = [

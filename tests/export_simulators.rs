@@ -1,27 +1,22 @@
 //! The exported robots in other simulators: PyBullet loads the URDF, MuJoCo the URDF and the MJCF.
 //!
-//! Needs a Python with pybullet, mujoco and numpy: `SFERS_PYTHON`, or the environment that `scripts/python.sh` makes. It is not skipped
-//! when there is none.
+//! Needs a Python with pybullet, mujoco and numpy (`common/tools.rs`).
+
+mod common;
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
+use common::tools;
 use serde_json::Value;
 use sfers::experiment::{self, Control, Experiment, Source};
 use sfers::export;
 use sfers::model::Mount;
 use sfers::recording::measures::Measures;
 
-fn python() -> PathBuf {
-    let path = std::env::var_os("SFERS_PYTHON")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python"), PathBuf::from);
-    assert!(path.exists(), "{} is missing: run bash scripts/python.sh, or set SFERS_PYTHON", path.display());
-    path
-}
-
-fn script(name: &str, arguments: &[&str], input: &str) -> Value {
-    let mut child = Command::new(python())
+fn script(python: &Path, name: &str, arguments: &[&str], input: &str) -> Value {
+    let mut child = Command::new(python)
         .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(name))
         .args(arguments)
         .stdin(Stdio::piped())
@@ -47,6 +42,8 @@ fn from_preset(preset: &str, settings: &[&str]) -> Experiment {
 /// Masses, inertias, frames and, over 0.1 s, the motion under the same torques, to 1e-9 relative.
 #[test]
 fn pybullet_loads_the_same_robot_from_the_urdf() {
+    let test = "pybullet_loads_the_same_robot_from_the_urdf";
+    let Some(python) = tools::python(test, &["pybullet", "numpy"]) else { return };
     let folder = tempfile::tempdir().unwrap();
     let length = "simulation={ time_step_s = 1e-5, duration_s = 0.1 }";
     for (preset, settings) in
@@ -55,7 +52,7 @@ fn pybullet_loads_the_same_robot_from_the_urdf() {
         let experiment = from_preset(preset, &settings);
         let path = folder.path().join("robot.urdf");
         std::fs::write(&path, export::urdf(&experiment, "test")).unwrap();
-        let answer = script("export_pybullet.py", &[path.to_str().unwrap()], &experiment.spec().to_string());
+        let answer = script(&python, "export_pybullet.py", &[path.to_str().unwrap()], &experiment.spec().to_string());
         assert_eq!(answer["links"], experiment.robot.joints() + 1, "{answer}");
         assert_eq!(answer["links"], answer["expected_links"]);
         assert_eq!(answer["steps"], 10_000);
@@ -72,6 +69,8 @@ fn pybullet_loads_the_same_robot_from_the_urdf() {
 
 #[test]
 fn mujoco_loads_urdf_and_mjcf_and_its_cantilever_bends_and_rings_alike() {
+    let test = "mujoco_loads_urdf_and_mjcf_and_its_cantilever_bends_and_rings_alike";
+    let Some(python) = tools::python(test, &["mujoco", "numpy"]) else { return };
     let folder = tempfile::tempdir().unwrap();
     let settings = ["simulation.time_step_s=4e-6", "simulation.duration_s=0.5"];
     let statics = from_preset("cantilever-dc", &settings);
@@ -80,7 +79,7 @@ fn mujoco_loads_urdf_and_mjcf_and_its_cantilever_bends_and_rings_alike() {
     std::fs::write(path("a.urdf"), export::urdf(&ringing, "test")).unwrap();
     std::fs::write(path("a.json"), export::sidecar(&ringing, "test").to_string()).unwrap();
     std::fs::write(path("a.xml"), export::mjcf(&ringing, "test")).unwrap();
-    let answer = script("export_mujoco.py", &[&path("a.urdf"), &path("a.xml"), &path("a.json"), "-1000", "-1500"], "");
+    let answer = script(&python, "export_mujoco.py", &[&path("a.urdf"), &path("a.xml"), &path("a.json"), "-1000", "-1500"], "");
 
     let mass: f64 = ringing.robot.segments().iter().map(|segment| segment.mass).sum();
     assert_eq!(answer["mjcf_joints"], 3);

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::Random;
+use common::random::Random;
 use sfers::crosscheck::{self, EngineVerdict};
 use sfers::experiment::{self, Source};
 
@@ -20,7 +20,7 @@ fn random(case: usize) -> String {
     let low = high * random.scale(0.065, 0.8);
     let film = ["both-ends", "right-end"][random.below(2)];
     let damping = random.scale(0.03, 0.1);
-    let frequency = 2.0 + 6.0 * random.share();
+    let frequency = 2.0 + 6.0 * random.uniform();
     let count = 2 + random.below(3);
     let phases: Vec<String> = (1..=count)
         .map(|i| {
@@ -40,6 +40,7 @@ fn random(case: usize) -> String {
 
 /// Where Bullet keeps its energy, and where a run with twice its step tells its error, the planar engine's strides are within 3 % beyond that.
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn robots_on_films_walk_as_on_bullet() {
     let count = if std::env::var("SFERS_LONG").is_ok_and(|long| long == "1") { 40 } else { 1 };
     let (mut agree, mut differ) = (0, 0_usize);

@@ -1,7 +1,7 @@
 //! An effect is hidden in data by a simulator that shares nothing with this program, and the diagnosis has to find it; where nothing is hidden it
 //! has to be silent; where the cause is in no library it has to say so.
 //!
-//! The short suite runs a sample of it. With `SFERS_LONG=1` (set by `scripts/test.sh --hidden`) each effect is hidden once in a size that turns with the
+//! A sample of it runs by default. With `SFERS_LONG=1` (set by `scripts/test.sh --hidden`) each effect is hidden once in a size that turns with the
 //! seed; `cargo run --release --example confusability` runs all sizes, noises and seeds and prints the matrix of docs/validation.md.
 
 #[path = "hidden/generator.rs"]
@@ -26,25 +26,28 @@ fn case<'a>(effects: &'a [&'a str], size: usize, seed: u64) -> Case<'a> {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn hidden_effects_are_named() {
     // Some of every kind; all of them where there is time.
     let some = ["tip-mass", "hysteresis", "time-delay", "sensor-scale"];
     let chosen: Vec<&str> = if long() { INSIDE.to_vec() } else { some.to_vec() };
-    let mut wrong = Vec::new();
+    let (mut wrong, mut counted) = (Vec::new(), 0);
     for (index, id) in chosen.iter().enumerate() {
         let (truth, outcome) = found(&case(&[id], index % 3, 11 + index as u64));
         let d = &outcome.diagnosis;
         // Effects whose trace is below three times the noise need not be found.
+        counted += usize::from(truth.trace_mm >= 0.15);
         if truth.trace_mm >= 0.15 && !is_right(d, id) {
             wrong.push(format!("{id}, {:.2} mm: {:?} {:?}", truth.trace_mm, d.verdict, names(d)));
         } else if is_right(d, id) {
             assert!(d.extended.rmse_heldout_mm < 1.2 * 0.05, "{id}: held-out error {} mm", d.extended.rmse_heldout_mm);
         }
     }
-    assert!(20 * wrong.len() <= chosen.len(), "{wrong:?}");
+    assert!(20 * wrong.len() <= chosen.len() && 2 * counted > chosen.len(), "{counted} counted, {wrong:?}");
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn nothing_is_found_where_nothing_is_hidden() {
     let count = if long() { 10 } else { 2 };
     for seed in 1..=count {
@@ -59,6 +62,7 @@ fn nothing_is_found_where_nothing_is_hidden() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn a_cause_outside_the_library_is_called_unexplained_and_described() {
     let some = ["drifting-gain"];
     let chosen: Vec<&str> = if long() { OUTSIDE.to_vec() } else { some.to_vec() };
@@ -78,6 +82,7 @@ fn a_cause_outside_the_library_is_called_unexplained_and_described() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn outliers_do_not_hide_a_cause() {
     let (truth, outcome) = found(&Case { outliers: true, ..case(&["tip-mass"], 2, 31) });
     let d = &outcome.diagnosis;
@@ -87,10 +92,8 @@ fn outliers_do_not_hide_a_cause() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn two_causes_at_once_are_both_named() {
-    if !long() {
-        return;
-    }
     for (pair, seed) in [(["damping", "time-delay"], 4), (["actuation-gain", "initial-curvature"], 4)] {
         let (_, outcome) = found(&case(&pair, 1, seed));
         let d = &outcome.diagnosis;
@@ -102,6 +105,7 @@ fn two_causes_at_once_are_both_named() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn the_same_verdict_and_numbers_for_any_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

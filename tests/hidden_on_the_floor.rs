@@ -1,6 +1,6 @@
 //! Effects hidden in data of a robot on the floor, which the Bullet engine makes and the planar engine explains.
 //!
-//! The short suite runs a sample of it, `SFERS_LONG=1` all; `cargo run --release --example confusability -- 1 5 0.1 floor` prints the matrix of
+//! A sample of it runs by default, `SFERS_LONG=1` runs all; `cargo run --release --example confusability -- 1 5 0.1 floor` prints the matrix of
 //! docs/confusability.md.
 
 #[path = "hidden/generator.rs"]
@@ -25,6 +25,7 @@ fn found(films: &[Film], seed: u64) -> Outcome {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn hidden_effects_are_named() {
     let chosen = if long() { INSIDE.map(|sizes| sizes.id).to_vec() } else { vec!["ground-friction"] };
     let (mut wrong, mut counted) = (Vec::new(), 0);
@@ -51,6 +52,7 @@ fn hidden_effects_are_named() {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn nothing_is_found_where_only_the_engines_differ() {
     let outcome = found(nominal(), 1);
     let d = &outcome.diagnosis;
@@ -61,6 +63,7 @@ fn nothing_is_found_where_only_the_engines_differ() {
 
 /// What a robot that nothing keeps in its plane does is an effect of its own.
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn left_to_itself_bullets_robot_turns() {
     let turning = film(&Floor { in_plane: false, ..Floor::default() });
     let trace = trace(&turning, nominal());

@@ -1,11 +1,12 @@
 //! Twenty robots drawn at random, here and on a live PyBullet 3.2.7: equal bits.
 //!
-//! Needs a Python with pybullet and numpy: `SFERS_PYTHON`, or the environment that `scripts/python.sh` makes. It is not skipped
-//! when there is none.
+//! Needs a Python with pybullet and numpy (`common/tools.rs`).
 
-use std::path::PathBuf;
+mod common;
+
 use std::sync::Mutex;
 
+use common::tools;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -14,13 +15,6 @@ use sfers::crosscheck::{compare, run_pybullet};
 use sfers::experiment::{self, Control, Experiment, Source};
 
 const ROBOTS: usize = 20;
-
-fn python() -> PathBuf {
-    let path = std::env::var_os("SFERS_PYTHON")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".venv/bin/python"), PathBuf::from);
-    assert!(path.exists(), "{} is missing: run bash scripts/python.sh, or set SFERS_PYTHON", path.display());
-    path
-}
 
 /// The waveform's lines of an experiment file, for `n` actuators.
 fn drive(n: usize) -> BoxedStrategy<String> {
@@ -83,7 +77,8 @@ fn robots() -> Vec<Experiment> {
 
 #[test]
 fn twenty_random_robots_have_equal_bits_on_a_live_pybullet() {
-    let python = python();
+    let test = "twenty_random_robots_have_equal_bits_on_a_live_pybullet";
+    let Some(python) = tools::python(test, &["pybullet", "numpy"]) else { return };
     let queue = Mutex::new(robots().into_iter().enumerate());
     let moved = Mutex::new(0);
     let failures = Mutex::new(Vec::new());

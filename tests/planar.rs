@@ -521,9 +521,9 @@ fn the_inchworm_at_10_hz_stays_on_the_floor() {
     assert!(height < 10.0, "{height} mm");
 }
 
-/// Of every run without contact the books close to rounding, as the scheme promises.
+/// The scheme conserves energy without contact.
 #[test]
-fn the_books_close_to_rounding() {
+fn the_energy_audit_without_contact_closes_to_rounding() {
     let free = experiment_of(
         "[robot]\nactuators = 3\nmount = \"free\"\ndamping_eta = 0.008\n[drive]\nwaveform = \"sine\"\namplitudes_v = [-1500, 300, 520]\nfrequency_hz = 20\n[simulation]\ntime_step_s = 1e-4\nduration_s = 0.5\n",
         &[],

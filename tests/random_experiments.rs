@@ -8,7 +8,7 @@ mod common;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use common::Random;
+use common::random::Random;
 use sfers::experiment::{self, Control, Experiment, Source};
 
 /// Another gives other experiments.
@@ -26,9 +26,9 @@ fn random(case: usize) -> (String, &'static str) {
     let (low, high) = (random.scale(0.1, 5.0), random.scale(0.1, 5.0));
     // As large as fits at both ends of one actuator: a film covers ⌈m f + ½⌉ of its m + 1 segments.
     let most = if actuators == 1 && motors.is_multiple_of(2) { 0.5 - 0.5 / motors as f64 } else { 0.5 };
-    let fraction = most * random.share();
+    let fraction = most * random.uniform();
     let damping = random.scale(0.02, 0.1);
-    let frequency = 2.0 + 16.0 * random.share();
+    let frequency = 2.0 + 16.0 * random.uniform();
     let drive = if actuators == 5 && random.below(2) == 0 {
         let gaits = ["inchworm", "inchworm-backward", "full-inchworm", "full-frictional-inchworm", "crawl", "frog-v2"];
         format!("waveform = \"gait\"\ngait = \"{}\"\nfrequency_hz = {frequency:.3}", gaits[random.below(gaits.len())])

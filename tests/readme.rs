@@ -24,6 +24,7 @@ fn blocks(language: &str) -> Vec<&'static str> {
 }
 
 #[test]
+#[ignore = "slow: run by scripts/test.sh"]
 fn every_command_of_the_readme_works_as_it_stands_in_an_empty_folder() {
     let folder = tempfile::tempdir().unwrap();
     let sfers = Path::new(env!("CARGO_BIN_EXE_sfers")).parent().unwrap();

@@ -1,8 +1,11 @@
 //! The residual tests of a diagnosis reject noise as often as they say: once in a thousand.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use common::random::Random;
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::plant::{Candidate, Model, Plant, Signal};
 use sfers::diagnose::residual_tests::residual_tests;
@@ -40,29 +43,11 @@ impl Plant for Measured {
     }
 }
 
-/// Uniform and normal numbers from a seed (S. Vigna's splitmix64; Box and Muller).
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (2.0 * PI * self.uniform()).cos()
-    }
-}
-
 /// Clean data: what is measured is what is predicted, with noise.
 struct Case {
     name: &'static str,
     rows: usize,
-    /// A wave of so many periods, or a ramp.
+    /// Periods of a wave, or 0 for a ramp.
     periods: f64,
     /// How far rows lie off an even spacing, as a share of it.
     uneven: f64,
@@ -72,7 +57,7 @@ struct Case {
 }
 
 fn alarms(case: &Case, seed: u64) -> BTreeMap<String, usize> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut found = BTreeMap::new();
     for _ in 0..PLANTS {
         let (mut signals, mut used, mut residuals) = (Vec::new(), Vec::new(), Vec::new());

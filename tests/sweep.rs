@@ -232,6 +232,7 @@ fn a_setting_replaces_the_only_value_of_a_key_and_is_refused_for_keys_that_vary(
         reader.records().map(Result::unwrap).map(|record| (record[0].to_owned(), record[3].to_owned())).collect()
     };
     let (long, short) = (cells("long/results.csv"), cells("short/results.csv"));
+    assert_eq!((long.len(), short.len()), (6, 6));
     assert!(long.iter().all(|row| row.0 == "5000") && short.iter().all(|row| row.0 == "1000"), "{short:?}");
     assert!(long.iter().zip(&short).all(|(a, b)| a.1 != b.1), "the setting changes nothing: {short:?}");
     let setting = ["s.toml", "--out", "out", "--set"];

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use common::tools;
 use serde_json::{Value, json};
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket};
@@ -152,14 +153,14 @@ struct Browser {
 }
 
 impl Browser {
-    fn open(page: &Path, profile: &Path) -> Self {
-        let mut process = Command::new("chromium")
+    fn open(mut chromium: Command, page: &Path, profile: &Path) -> Self {
+        let mut process = chromium
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0", "--window-size=1000,480"])
             .arg(format!("--user-data-dir={}", profile.display()))
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()
-            .expect("Chromium is needed for this test; `bash scripts/test.sh` installs it");
+            .unwrap();
         let lines = BufReader::new(process.stderr.take().unwrap()).lines();
         let address = lines.map_while(Result::ok).find_map(|line| line.strip_prefix("DevTools listening on ").map(String::from));
         let (socket, _) = tungstenite::connect(address.expect("Chromium ended before it listened")).unwrap();
@@ -218,14 +219,14 @@ impl Drop for Browser {
     }
 }
 
-/// Needs Chromium, which `bash scripts/test.sh` installs.
 #[test]
 fn the_page_plays_and_scrubs_in_a_browser_without_an_error() {
+    let Some(chromium) = tools::chromium("the_page_plays_and_scrubs_in_a_browser_without_an_error") else { return };
     let bench = Bench::new();
     bench.done(&["animate", "a.npz", "--speed", "0.03", "--out", "a.html"]);
     let page = fs::read_to_string(bench.path("a.html")).unwrap();
     assert!(!page.contains("http://") && !page.contains("https://"), "the page is not self-contained");
-    let mut browser = Browser::open(&bench.path("a.html"), &bench.path("profile"));
+    let mut browser = Browser::open(chromium, &bench.path("a.html"), &bench.path("profile"));
     assert_eq!(browser.value("document.getElementById('speed').selectedOptions[0].textContent"), "× 0.03");
     assert_eq!(browser.value("window.sfers.frames"), 101);
     let first = browser.value("window.sfers.nodes");

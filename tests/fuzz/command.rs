@@ -146,7 +146,7 @@ pub fn make(random: &mut Random) -> Input {
     input
 }
 
-/// Whether the command comes to an end soon: what is asked for decides about that, not the program.
+/// True if the command ends soon, which its arguments decide, not the program.
 fn soon(input: &Input, folder: &Path) -> bool {
     let words: Vec<&str> = input.words.iter().map(String::as_str).collect();
     let small = |source: &Source| match experiment::experiment(source) {

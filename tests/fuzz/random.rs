@@ -2,9 +2,11 @@
 
 use toml::{Table, Value};
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): one word of state, so that a case needs none of those before it.
+use crate::common::random::Random as Generator;
+
+/// Random numbers with one word of state, so that a case needs none of those before it.
 #[derive(Debug, Clone)]
-pub struct Random(u64);
+pub struct Random(Generator);
 
 /// Numbers that programs stumble over, as texts; some are numbers of one format only, or none.
 const NUMBERS: [&str; 44] = [
@@ -96,17 +98,12 @@ impl Random {
     /// The random numbers of one case.
     pub fn new(seed: u64, kind: &str, case: u64) -> Self {
         let name = kind.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, b| (hash ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
-        let mut random = Self(seed ^ name);
-        let start = random.next() ^ case;
-        Self(start)
+        let start = Generator::new(seed ^ name).next() ^ case;
+        Self(Generator::new(start))
     }
 
     pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.next()
     }
 
     /// A whole number below `n`, which is at least 1.

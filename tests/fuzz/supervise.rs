@@ -249,7 +249,7 @@ fn work(batch: &Batch, from: u64, seed: u64, limit: Duration, path: &Path) -> Op
     let mut child = Command::new("sh")
         .args(["-c", &format!("ulimit -c 0; ulimit -v {MEMORY_KB} && exec \"$0\" \"$@\"")])
         .arg(program)
-        .args(["worker", "--exact", "--ignored", "--nocapture"])
+        .args(["worker_process", "--exact", "--ignored", "--nocapture"])
         .env(JOB, format!("{} {seed} {from} {} {}", batch.kind.name, batch.to, path.display()))
         .env("RUST_BACKTRACE", "0")
         .stdin(Stdio::null())

@@ -3,6 +3,7 @@
 use super::Hidden;
 use super::chain::BRANCHES;
 use super::protocol::{Creep, Plays, RUNS};
+use super::random::Random;
 
 /// Number of play operators of the hysteresis; their radii go up to 1500 V.
 pub const RADII: usize = 12;
@@ -105,45 +106,6 @@ impl Default for Nature {
     }
 }
 
-/// Random numbers: splitmix64, and Box and Muller's normal deviates.
-pub struct Random(u64);
-
-impl Random {
-    /// A stream of its own for each seed and purpose.
-    pub fn new(seed: u64, purpose: &str) -> Random {
-        let mixed =
-            purpose.bytes().fold(seed ^ 0x5851_f42d_4c95_7f2d, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
-        let mut random = Random(mixed);
-        random.next();
-        random
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn uniform(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.uniform()
-    }
-
-    pub fn below(&mut self, count: usize) -> usize {
-        (self.uniform() * count as f64) as usize
-    }
-
-    pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-}
-
 /// Ranges of the value for a small, medium and large trace (0.15-0.3, 0.3-0.75 and 0.75-2 mm), on one or both sides of the value
 /// that hides nothing. The bounds of the library cut a few of them short: those cannot reach a large trace.
 struct Sizes {
@@ -225,7 +187,7 @@ fn draw(id: &str, size: usize, random: &mut Random) -> f64 {
 
 /// Hides an effect of a size in a plant.
 pub fn hide(id: &'static str, size: usize, seed: u64, nature: &mut Nature) -> Hidden {
-    let mut random = Random::new(seed, &format!("{id} {size}"));
+    let mut random = Random::with_purpose(seed, &format!("{id} {size}"));
     let value = draw(id, size, &mut random);
     Hidden { id, parameters: set(id, value, nature, &mut random) }
 }

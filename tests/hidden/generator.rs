@@ -4,7 +4,7 @@
 //! its coordinates are absolute angles with a dense mass matrix instead of joint angles and a recursion, its integrator is an
 //! L-stable third-order Runge-Kutta method, and it has its own random numbers. Several effects follow other equations than those
 //! the program fits: hysteresis is a sum of play operators (with the gain kept
-//! over a full stroke), creep and structural damping are ladders of half-decade branches, dry
+//! over a full stroke), creep and structural damping have branches half a decade apart, dry
 //! friction follows an arc tangent, drag is a quadrature along each rod, a saturating amplifier has a rounded knee, and the gain
 //! that grows with the field is smooth at zero. What they share is the physics: a wrong sign or factor shows as a misfit.
 //!
@@ -18,10 +18,13 @@ pub mod chain;
 pub mod effects;
 #[path = "protocol.rs"]
 pub mod protocol;
+#[path = "../common/random.rs"]
+pub mod random;
 
 use chain::{Chain, Grid};
-use effects::{Nature, Random, hide};
+use effects::{Nature, hide};
 use protocol::{Drive, RUNS, Run};
+use random::Random;
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -100,14 +103,14 @@ pub type Markers = Vec<[f64; 4]>;
 /// Writes dataset.toml and the CSV files of a case.
 pub fn write(folder: &Path, case: &Case) -> Truth {
     let mut nature = Nature::default();
-    let asked = case.effects.iter().filter(|id| **id != "none");
+    let chosen = case.effects.iter().filter(|id| **id != "none");
     let known = |id: &&str| *INSIDE.iter().chain(OUTSIDE).find(|k| *k == id).unwrap_or_else(|| panic!("no effect {id}"));
-    let hidden: Vec<Hidden> = asked.map(|id| hide(known(id), case.size, case.seed, &mut nature)).collect();
+    let hidden: Vec<Hidden> = chosen.map(|id| hide(known(id), case.size, case.seed, &mut nature)).collect();
     let clean = nominal();
     let markers = if hidden.is_empty() { clean.clone() } else { simulate(&nature, grid_for(&nature)) };
     std::fs::create_dir_all(folder).expect("the folder of the dataset");
     std::fs::write(folder.join("dataset.toml"), description(case)).expect("dataset.toml");
-    let mut random = Random::new(case.seed, "camera");
+    let mut random = Random::with_purpose(case.seed, "camera");
     let damaged = case.damaged.then(|| random.below(RUNS.len()));
     for (i, run) in RUNS.iter().enumerate() {
         let mut seen = markers[i].clone();
@@ -175,7 +178,7 @@ fn distort(row: &mut [f64; 4], nature: &Nature, index: usize, t: f64) {
     }
 }
 
-/// Adds noise, and wild values where asked for.
+/// Adds noise, and outliers where the case has them.
 fn photograph(rows: &mut Markers, case: &Case, random: &mut Random) {
     for row in rows {
         for value in row.iter_mut() {

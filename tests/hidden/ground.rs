@@ -18,8 +18,9 @@ use sfers::engine::{BulletEngine, Engine};
 use sfers::experiment::{self, Source};
 use sfers::model::Robot;
 
-use super::generator::effects::{Random, loop_width, put};
+use super::generator::effects::{loop_width, put};
 use super::generator::protocol::Plays;
+use super::generator::random::Random;
 
 /// Time between rows (s).
 const ROW: f64 = 5e-3;
@@ -98,7 +99,7 @@ pub struct Floor {
     pub delay_s: f64,
     pub hysteresis: f64,
     pub tilt_deg: f64,
-    /// Whether the robot is kept in its plane.
+    /// True if the robot is kept in its plane.
     pub in_plane: bool,
 }
 
@@ -149,7 +150,7 @@ pub const INSIDE: [Sizes; 9] = [
 pub fn hide(id: &str, size: usize, seed: u64) -> (Floor, Vec<(&'static str, f64)>) {
     let Sizes { ranges, mirror, .. } =
         INSIDE.into_iter().find(|sizes| sizes.id == id).unwrap_or_else(|| panic!("no effect {id}"));
-    let mut random = Random::new(seed, &format!("floor {id} {size}"));
+    let mut random = Random::with_purpose(seed, &format!("floor {id} {size}"));
     let drawn = random.between(ranges[size].0, ranges[size].1);
     let value = match mirror {
         Some(off) if random.uniform() < 0.5 => 2.0 * off - drawn,
@@ -278,7 +279,7 @@ pub fn write(folder: &Path, films: &[Film], noise_mm: f64, seed: u64) {
         let _ = writeln!(text, "{name} = {}", 10.0 * arc);
     }
     let _ = writeln!(text, "\n[noise]\ndefault_mm = {noise_mm}");
-    let mut random = Random::new(seed, "camera over the floor");
+    let mut random = Random::with_purpose(seed, "camera over the floor");
     for (wave, film) in WAVES.iter().zip(films) {
         let _ = write!(text, "\n[[run]]\nid = \"{0}\"\nfile = \"{0}.csv\"\n", wave.id);
         let mut table = String::from("t_s,v1_v,v2_v,v3_v");

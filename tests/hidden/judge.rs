@@ -21,7 +21,7 @@ pub fn diagnosed(folder: &Path) -> Outcome {
     diagnose(&plant, "case", &roles, checked.remarks, &|_| {}, &separate).expect("the nominal model runs")
 }
 
-/// Causes that these data cannot tell apart, by effects.md: one name of a line stands for all.
+/// Causes that motion alone cannot tell apart (docs/validation.md): one name of a line stands for all.
 const INSEPARABLE: [&[&str]; 2] = [&["stiffness", "areal-mass"], &["time-delay", "sensor-delay"]];
 
 /// Adopted causes beside the discretisation.
@@ -34,7 +34,7 @@ pub fn names(d: &Diagnosis) -> Vec<&str> {
     physics(d).iter().map(|effect| effect.id.as_str()).collect()
 }
 
-/// Whether the hidden cause is named, alone, or tied within what cannot be told apart.
+/// True if the hidden cause is named, alone, or tied within what cannot be told apart.
 pub fn is_right(d: &Diagnosis, hidden: &str) -> bool {
     let [effect] = physics(d)[..] else { return false };
     let set = INSEPARABLE.iter().find(|set| set.contains(&hidden)).copied().unwrap_or_default();
@@ -52,12 +52,12 @@ pub fn range(d: &Diagnosis, hidden: &str, parameter: &str) -> Option<[f64; 2]> {
     Some([low?, high?])
 }
 
-/// Whether it holds the true value.
+/// True if it holds the true value.
 pub fn holds(d: &Diagnosis, hidden: &str, parameter: &str, value: f64) -> Option<bool> {
     range(d, hidden, parameter).map(|[low, high]| low <= value && value <= high)
 }
 
-/// Whether the longer suites run.
+/// True for every effect instead of a sample: `scripts/test.sh --hidden`.
 pub fn long() -> bool {
     std::env::var("SFERS_LONG").is_ok_and(|value| value == "1")
 }

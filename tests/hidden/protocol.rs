@@ -245,7 +245,7 @@ impl Plays {
     }
 }
 
-/// A ladder of slow branches, half a decade apart from 0.1 s.
+/// Slow branches, half a decade apart from 0.1 s.
 pub struct Creep {
     share: f64,
     states: [f64; 6],
