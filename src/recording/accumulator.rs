@@ -11,7 +11,8 @@
 mod clamped;
 mod mobile;
 
-use super::measures::Measures;
+use super::Recording;
+use super::measures::{Measures, copy_nodes, recorded_jump_height};
 use super::signal::Repetition;
 use crate::model::Mount;
 use clamped::Clamped;
@@ -164,5 +165,28 @@ impl MeasureAccumulator {
             Kind::Clamped(clamped) => clamped.measures(&self.plan, ended),
             Kind::Mobile(mobile) => mobile.measures(&self.plan, &self.before, time, ended),
         }
+    }
+}
+
+impl Measures {
+    /// Computes measures from the records of a recording; the motion between records is unknown, so prefer a run's own measures,
+    /// [`Run::measures`](crate::experiment::Run). `period` (s): that of the drive, if it repeats.
+    pub fn of(recording: &Recording, mount: Mount, period: Option<f64>) -> Self {
+        let (Some(&first), Some(&last)) = (recording.time.first(), recording.time.last()) else { return Self::default() };
+        let samples = recording.len();
+        let plan = SamplingPlan { mount, nodes: recording.nodes(), period, first, last, samples, spacing: 0.0 };
+        let mut accumulator = MeasureAccumulator::new(plan);
+        for (record, &time) in recording.time.iter().enumerate() {
+            copy_nodes(recording, record, accumulator.places());
+            accumulator.take(time, true);
+            if let Some(volts) = recording.motor_voltages.chunks_exact(recording.joints().max(1)).nth(record) {
+                accumulator.voltages(time, volts);
+            }
+        }
+        let mut measures = accumulator.measures();
+        if measures.jump_height_mm.is_some() {
+            measures.recorded_jump_height_mm = Some(recorded_jump_height(recording));
+        }
+        measures
     }
 }

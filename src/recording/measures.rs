@@ -3,8 +3,6 @@
 use serde::Serialize;
 
 use super::Recording;
-use super::accumulator::{MeasureAccumulator, SamplingPlan};
-use crate::model::Mount;
 use crate::model::units::mm_from_cm;
 
 /// Clearance below which a node touches the floor (cm): well above the 10⁻⁴ cm of resting contact.
@@ -117,7 +115,7 @@ pub(super) fn contact_state(nodes: &[[f64; 2]]) -> (ContactState, f64) {
 }
 
 /// Copies x and z (cm) of the nodes in a record.
-fn copy_nodes(recording: &Recording, record: usize, to: &mut [[f64; 2]]) {
+pub(super) fn copy_nodes(recording: &Recording, record: usize, to: &mut [[f64; 2]]) {
     for (node, to) in to.iter_mut().enumerate() {
         let [x, _, z] = recording.node(record, node);
         *to = [x, z];
@@ -132,27 +130,6 @@ pub(crate) fn recorded_jump_height(recording: &Recording) -> f64 {
 }
 
 impl Measures {
-    /// Computes measures from the records of a recording; the motion between records is unknown, so prefer a run's own measures,
-    /// [`Run::measures`](crate::experiment::Run). `period` (s): that of the drive, if it repeats.
-    pub fn of(recording: &Recording, mount: Mount, period: Option<f64>) -> Self {
-        let (Some(&first), Some(&last)) = (recording.time.first(), recording.time.last()) else { return Self::default() };
-        let samples = recording.len();
-        let plan = SamplingPlan { mount, nodes: recording.nodes(), period, first, last, samples, spacing: 0.0 };
-        let mut accumulator = MeasureAccumulator::new(plan);
-        for (record, &time) in recording.time.iter().enumerate() {
-            copy_nodes(recording, record, accumulator.places());
-            accumulator.take(time, true);
-            if let Some(volts) = recording.motor_voltages.chunks_exact(recording.joints().max(1)).nth(record) {
-                accumulator.voltages(time, volts);
-            }
-        }
-        let mut measures = accumulator.measures();
-        if measures.jump_height_mm.is_some() {
-            measures.recorded_jump_height_mm = Some(recorded_jump_height(recording));
-        }
-        measures
-    }
-
     /// Names and values of the measures that are present.
     pub fn named(&self) -> Vec<(String, f64)> {
         let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(self) else { return Vec::new() };

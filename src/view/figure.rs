@@ -232,10 +232,29 @@ impl Figure {
     }
 }
 
+/// A heat map of `values`, rows × columns from the bottom row, as SVG; missing values are hatched.
+pub fn heat_map(title: &str, label: &str, x: &Categories, y: &Categories, values: &[Option<f64>]) -> String {
+    let mut figure = Figure::new(title, &x.label, &y.label);
+    figure.map(x, y, values, label);
+    figure.size(Size::SCREEN).svg()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_map_has_a_cell_per_value_and_hatches_what_is_missing() {
+        let axis = |label: &str, n: usize| Categories { label: label.into(), texts: (0..n).map(|i| i.to_string()).collect() };
+        let svg = heat_map("t", "v (mm)", &axis("x (s)", 2), &axis("y <", 2), &[Some(0.0), Some(1.0), None, Some(f64::NAN)]);
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let cells = document.descendants().find(|node| node.attribute("class") == Some("cells")).unwrap();
+        let fills: Vec<_> = cells.descendants().filter_map(|node| node.attribute("fill")).collect();
+        assert_eq!(cells.descendants().filter(|node| node.attribute("class") == Some("missing")).count(), 2);
+        assert!(fills.contains(&"#440154") && fills.contains(&"#fde725"));
+        assert!(document.descendants().any(|node| node.text() == Some("no value")));
+    }
 
     proptest! {
         #[test]

@@ -16,9 +16,9 @@ mod series;
 mod text;
 
 pub use canvas::Size;
-pub use figure::Figure;
+pub use figure::{Figure, heat_map};
 pub use gif::gif;
-pub use heatmap::{Categories, colour, heat_map};
+pub use heatmap::{Categories, colour};
 pub use image::{ImageError, pdf, png};
 pub use number::{NONE, digits_for, fixed, minus, signed, significant};
 pub use player::player;
