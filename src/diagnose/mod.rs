@@ -30,6 +30,7 @@ pub mod residual_tests;
 pub mod robot;
 mod run_csv;
 pub mod search;
+mod summary;
 mod track;
 pub mod voltage;
 

@@ -2,13 +2,14 @@
 
 use super::DiagnoseError;
 use super::dataset::Role;
-use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict, failing, summary};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
 use super::fit::{BLOCK, Estimator, Residuals};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
+use super::summary::{failing, summary};
 
 /// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
 const SEARCH_RESOLUTION: f64 = 10.0;

@@ -2,13 +2,14 @@
 
 use std::fmt::Write;
 
-use super::diagnosis::{Diagnosis, Stage, Verdict, failing};
+use super::diagnosis::{Diagnosis, Stage, Verdict};
 use super::fit::sum_of_squares;
 use super::names;
 use super::picture;
 use super::pipeline::Outcome;
 use super::plant::{Plant, Signal};
 use super::residual_tests::{ResidualTest, rows_by_channel, sum_over};
+use super::summary::failing;
 use crate::model::Robot;
 use crate::view::page::{Cell, HALF, Table, document, figure};
 use crate::view::{Figure, Mark, digits_for, escape, fixed, minus, signed, significant};

@@ -170,6 +170,7 @@ impl Measures {
 mod tests {
     use super::super::Meta;
     use super::*;
+    use crate::model::Mount;
     use std::f64::consts::PI;
 
     /// A robot of one actuator with `m` joints whose nodes move as `(x, z)` (cm) of node and time, on 1 V − cos.

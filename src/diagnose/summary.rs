@@ -1,0 +1,134 @@
+//! The verdict of a diagnosis in a sentence.
+
+use super::diagnosis::{Adopted, Verdict};
+use super::names;
+use super::residual_tests::ResidualTest;
+
+/// Share of tests that noise alone fails.
+const FAILED_BY_CHANCE: f64 = 1e-3;
+/// Failures are beyond chance if noise alone causes as many in a smaller share of cases.
+const BEYOND_CHANCE: f64 = 1e-3;
+
+/// The failed residual tests in words, if they are more than chance explains.
+pub fn failing(tests: &[ResidualTest]) -> Option<String> {
+    let failed: Vec<&ResidualTest> = tests.iter().filter(|test| !test.passed).collect();
+    let (count, n) = (failed.len(), tests.len() as f64);
+    // Probability of fewer failures, binomial.
+    let mut term = (1.0 - FAILED_BY_CHANCE).powf(n);
+    let mut fewer = 0.0;
+    for k in 0..count {
+        fewer += term;
+        term *= (n - k as f64) / (k as f64 + 1.0) * FAILED_BY_CHANCE / (1.0 - FAILED_BY_CHANCE);
+    }
+    if 1.0 - fewer >= BEYOND_CHANCE {
+        return None;
+    }
+    let mut names: Vec<(&str, usize)> = Vec::new();
+    for test in failed {
+        match names.iter_mut().find(|(name, _)| *name == test.name) {
+            Some((_, times)) => *times += 1,
+            None => names.push((&test.name, 1)),
+        }
+    }
+    names.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
+    let list: Vec<String> = names.iter().map(|(name, times)| format!("{name} {times}")).collect();
+    let verb = if count == 1 { "fails" } else { "fail" };
+    Some(format!("{count} of {} residual tests still {verb}, more than chance explains ({})", tests.len(), list.join(", ")))
+}
+
+/// The verdict in a sentence. `left` is the unexplained fraction, `insufficient` why the data are insufficient, `failing` the result of [`failing`]
+/// for the extended model.
+pub(super) fn summary(
+    verdict: Verdict,
+    effects: &[Adopted],
+    left: f64,
+    insufficient: Option<&str>,
+    resolution: f64,
+    refined: bool,
+    failing: Option<&str>,
+) -> String {
+    let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
+    let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
+    let name = |effect: &Adopted| {
+        let parameters: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();
+        format!("{} ({})", names::with_form(&effect.id, &names::form_of(effect)), parameters.join("; "))
+    };
+    let physics: Vec<&Adopted> = effects.iter().filter(|effect| effect.id != "discretisation").collect();
+    let named = physics.iter().map(|effect| name(effect)).collect::<Vec<_>>().join("; ");
+    match verdict {
+        Verdict::None => match (insufficient, failing) {
+            (Some(insufficient), _) => format!("Nothing stands out, but {insufficient}{}.", but.replacen(", but", ", and", 1)),
+            (None, None) => format!("Nothing is missing: the nominal model{finely} explains the data to the noise."),
+            (None, Some(failing)) => format!(
+                "No cause in the library is needed: the nominal model{finely} leaves residuals of the size of the noise, but {failing}."
+            ),
+        },
+        Verdict::Named => format!("The simulation lacks: {named}{but}."),
+        Verdict::Tied => {
+            let ties: Vec<_> = physics
+                .iter()
+                .filter(|effect| !effect.tied_with.is_empty())
+                .map(|effect| {
+                    let others: Vec<String> = effect.tied_with.iter().map(|id| names::cause(id)).collect();
+                    format!("{} cannot be told from {}", names::cause(&effect.id), others.join(", "))
+                })
+                .collect();
+            format!("The simulation lacks: {named}; in these data {}{but}.", ties.join("; "))
+        }
+        Verdict::Unexplained => match (insufficient, physics.is_empty()) {
+            (Some(insufficient), _) => {
+                format!("The nominal model does not explain the data, and {insufficient}{}.", but.replacen(", but", ", and", 1))
+            }
+            (None, true) => format!(
+                "The nominal model does not explain the data, and no cause in the library does{}.",
+                but.replacen(", but", ":", 1)
+            ),
+            (None, false) => format!(
+                "{named} explains a part, but {:.0} % of the misfit is left, which no cause in the library explains{}.",
+                100.0 * left,
+                but.replacen(", but", ", and", 1)
+            ),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tests(count: usize, failed: usize) -> Vec<ResidualTest> {
+        let test = |index: usize| ResidualTest {
+            name: if index == 0 { "loop area" } else { "drift in log time" }.into(),
+            run: index.to_string(),
+            statistic: 1.0,
+            limit: 0.5,
+            passed: index >= failed,
+            meaning: String::new(),
+        };
+        (0..count).map(test).collect()
+    }
+
+    #[test]
+    fn tests_that_fail_by_chance_are_not_counted_against_a_model() {
+        // Of 80 tests noise alone fails two or more in 0.3 % of cases, three or more in 0.008 %.
+        assert_eq!(failing(&tests(80, 0)), None);
+        assert_eq!(failing(&tests(80, 2)), None);
+        assert!(failing(&tests(80, 3)).is_some() && failing(&tests(5, 2)).is_some());
+        assert!(failing(&tests(1000, 3)).is_none());
+    }
+
+    #[test]
+    fn the_first_sentence_of_every_verdict_names_tests_that_fail_beyond_chance() {
+        let words = failing(&tests(80, 3)).unwrap();
+        assert_eq!(words, "3 of 80 residual tests still fail, more than chance explains (drift in log time 2, loop area 1)");
+        for verdict in [Verdict::None, Verdict::Named, Verdict::Tied, Verdict::Unexplained] {
+            for insufficient in [None, Some("one run is too little")] {
+                let first = |failing| summary(verdict, &[], 0.3, insufficient, 10.0, true, failing);
+                assert!(first(Some(words.as_str())).split(". ").next().unwrap().contains(&words), "{verdict:?}");
+                assert!(!first(None).contains("residual tests"));
+            }
+        }
+        let honest = summary(Verdict::None, &[], 0.0, None, 3.0, false, Some(&words));
+        assert!(!honest.contains("explains the data"), "{honest}");
+    }
+}
