@@ -6,12 +6,11 @@ use super::dataset::{Dataset, Observation};
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
 use super::fit::{Bench, Care, Fit};
 use super::plant::{Candidate, Model, Plant, Signal, Term};
-use super::{names, report, robot};
+use super::{names, robot};
 use crate::experiment::{self, Config, ConfigError, Control, EffectConfig, Source};
 use crate::model::Mount;
+use crate::number::fixed;
 use crate::recording::definitions;
-use crate::view::page::{Cell, Table, document};
-use crate::view::{digits_for, escape, fixed, label_of, signed};
 use crate::words;
 
 /// A model explains the numbers if each lies within two standard deviations, in the mean.
@@ -393,7 +392,12 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
 }
 
 /// The page, in the style of the [`report`]: the verdict, every number, what would reach them.
+#[cfg(feature = "view")]
 pub fn page(found: &Found, dataset: &Dataset, command: &str) -> String {
+    use super::report;
+    use crate::view::page::{Cell, Table, document};
+    use crate::view::{digits_for, escape, label_of, signed};
+
     let Found { diagnosis: d, numbers, ways } = found;
     let mut out = report::heading(d);
     out.push_str(

@@ -8,16 +8,8 @@ use super::{RowError, Sweep};
 use crate::files::Pending;
 
 /// The program that computes: results may change with its revision, and with Bullet's.
-const PROGRAM: &str = concat!(
-    "sfers ",
-    env!("CARGO_PKG_VERSION"),
-    ", revision ",
-    env!("SFERS_GIT_REVISION"),
-    ", Bullet ",
-    env!("SFERS_BULLET_VERSION"),
-    " ",
-    env!("SFERS_BULLET_PRECISION")
-);
+const PROGRAM: &str =
+    concat!("sfers ", env!("CARGO_PKG_VERSION"), ", revision ", env!("SFERS_GIT_REVISION"), ", Bullet ", env!("SFERS_BULLET"));
 
 /// The key of the list of programs, which alone may grow.
 const PROGRAMS: &str = "programs";

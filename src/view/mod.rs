@@ -1,4 +1,4 @@
-//! Pictures: figures as SVG, PNG and PDF, animations as HTML and GIF; what HTML pages share; numbers as people read them.
+//! Pictures: figures as SVG, PNG and PDF, animations as HTML and GIF; what HTML pages share.
 
 mod axis;
 mod canvas;
@@ -6,7 +6,6 @@ mod figure;
 mod gif;
 mod heatmap;
 mod image;
-mod number;
 pub(crate) mod page;
 mod panel;
 mod player;
@@ -15,12 +14,12 @@ mod results;
 mod series;
 mod text;
 
+pub use crate::number::{NONE, digits_for, fixed, minus, signed, significant};
 pub use canvas::Size;
 pub use figure::Figure;
 pub use gif::gif;
 pub use heatmap::{Categories, colour, heat_map};
 pub use image::{pdf, png};
-pub use number::{NONE, digits_for, fixed, minus, signed, significant};
 pub use player::player;
 pub use recordings::{Kind, aliased, amplitudes, shape, shapes, spectrum, traces};
 pub use results::{ResultsError, View, figure_of_results, label_of, results};
