@@ -1,16 +1,12 @@
-//! Records Bullet's version and precision, and the git revision, for the manifest of every result.
+//! Refuses targets that nothing is tested on, and records Bullet's version and the git revision for the manifest of every result.
 
 use std::env;
 use std::path::Path;
 use std::process::Command;
 
 fn main() {
-    for (name, metadata) in
-        [("SFERS_BULLET_VERSION", "DEP_BULLET_FLOAT64_VERSION"), ("SFERS_BULLET_PRECISION", "DEP_BULLET_FLOAT64_PRECISION")]
-    {
-        let value = env::var(metadata).unwrap_or_else(|_| "unknown".into());
-        println!("cargo::rustc-env={name}={value}");
-    }
+    refuse_other_targets();
+    println!("cargo::rustc-env=SFERS_BULLET={}", bullet());
     println!("cargo::rustc-env=SFERS_GIT_REVISION={}", git_revision());
     println!("cargo::rerun-if-changed=build.rs");
     for path in [".git/HEAD", ".git/logs/HEAD"] {
@@ -18,6 +14,27 @@ fn main() {
             println!("cargo::rerun-if-changed={path}");
         }
     }
+}
+
+/// Recordings, states and contact arithmetic are tested with 64-bit little-endian words only.
+fn refuse_other_targets() {
+    let target = |what: &str| env::var(format!("CARGO_CFG_TARGET_{what}")).unwrap_or_default();
+    if target("POINTER_WIDTH") != "64" || target("ENDIAN") != "little" {
+        println!(
+            "cargo::error=sfers needs a 64-bit little-endian target, and {} is none",
+            env::var("TARGET").unwrap_or_default()
+        );
+        std::process::exit(1);
+    }
+}
+
+/// Version and precision as the build script of bullet-sys found them.
+fn bullet() -> String {
+    if env::var_os("CARGO_FEATURE_BULLET").is_none() {
+        return "not built".into();
+    }
+    let found = |what: &str| env::var(format!("DEP_BULLET_FLOAT64_{what}")).unwrap_or_else(|_| "unknown".into());
+    format!("{} {}", found("VERSION"), found("PRECISION"))
 }
 
 /// The commit, or `unknown` outside a git checkout.

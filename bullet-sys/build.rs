@@ -7,15 +7,24 @@ use std::path::{Path, PathBuf};
 const BULLET_VERSION: &str = "3.24";
 const DEBIAN_PACKAGE: &str = "libbullet-dev";
 const SOURCES: [&str; 7] = ["world.cpp", "multibody.cpp", "contact.cpp", "snapshot.cpp", "chain.cpp", "fixed.cpp", "solver.cpp"];
-const HEADERS: [&str; 6] = ["bullet_shim.h", "internal.h", "snapshot_state.h", "chain.h", "fixed.h", "solver.h"];
+const HEADERS: [&str; 7] = ["bullet_shim.h", "internal.h", "snapshot_state.h", "chain.h", "fixed.h", "solver.h", "impulse.h"];
 
 fn main() {
+    refuse_other_targets();
     let bullet = find_bullet();
     compile_shim(&bullet);
     bind_header();
     // Read by the build script of the crate that depends on this one, as DEP_BULLET_FLOAT64_VERSION and so on.
     println!("cargo::metadata=version={}", bullet.version);
     println!("cargo::metadata=precision=float64");
+}
+
+/// Snapshots hold indices and flags as doubles, and the layout of Bullet's structures is tested with 64-bit little-endian words only.
+fn refuse_other_targets() {
+    let target = |what: &str| env::var(format!("CARGO_CFG_TARGET_{what}")).unwrap_or_default();
+    if target("POINTER_WIDTH") != "64" || target("ENDIAN") != "little" {
+        fail(&format!("the shim needs a 64-bit little-endian target, and {} is none", env::var("TARGET").unwrap_or_default()));
+    }
 }
 
 /// Asks pkg-config for the double-precision libraries. Plain `bullet` is single precision.

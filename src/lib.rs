@@ -59,9 +59,14 @@
 //! Z. Zheng et al., "Scalable Simulation and Demonstration of Jumping Piezoelectric 2-D Soft Robots", ICRA 2022,
 //! doi:10.1109/ICRA46639.2022.9811927, arXiv 2202.13521, and the published code `sfers`.
 
+// Some private items have their only user in a feature.
+#![cfg_attr(not(all(feature = "bullet", feature = "cli", feature = "view")), allow(dead_code, unused_imports))]
+
 pub mod actuator;
 pub mod analytic;
+#[cfg(feature = "bullet")]
 pub mod bullet;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod crosscheck;
 pub mod diagnose;
@@ -73,11 +78,15 @@ pub mod export;
 mod files;
 pub mod keys;
 pub mod model;
+pub mod number;
 pub mod recording;
+#[cfg(all(feature = "bullet", feature = "view"))]
 pub mod reproduce;
 pub mod sweep;
+#[cfg(feature = "view")]
 pub mod view;
 mod words;
+mod xml;
 
 /// Compiles and runs the examples of the README.
 #[cfg(doctest)]

@@ -1,10 +1,9 @@
 #include "solver.h"
 
-#include <emmintrin.h>
-
 #include "BulletCollision/NarrowPhaseCollision/btPersistentManifold.h"
 #include "BulletDynamics/Featherstone/btMultiBody.h"
 #include "BulletDynamics/Featherstone/btMultiBodyLinkCollider.h"
+#include "impulse.h"
 
 namespace bs {
 
@@ -245,22 +244,6 @@ static inline btScalar dot(const btScalar *a, const btScalar *b, int count) {
   return sum;
 }
 
-// changes[i] += response[i] * impulse, for both sums of changes.
-static inline void add(const btScalar *response, btScalar impulse, btScalar *changes, btScalar *body_changes, int count) {
-  const __m128d both = _mm_set1_pd(impulse);
-  int i = 0;
-  for (; i + 2 <= count; i += 2) {
-    const __m128d step = _mm_mul_pd(_mm_loadu_pd(response + i), both);
-    _mm_storeu_pd(changes + i, _mm_add_pd(_mm_loadu_pd(changes + i), step));
-    _mm_storeu_pd(body_changes + i, _mm_add_pd(_mm_loadu_pd(body_changes + i), step));
-  }
-  for (; i < count; ++i) {
-    const btScalar step = response[i] * impulse;
-    changes[i] += step;
-    body_changes[i] += step;
-  }
-}
-
 // The change of impulse that would meet the row's target, before any limit.
 btScalar Solver::wanted(const Row &row) {
   const btMultiBodySolverConstraint &c = *row.constraint;
@@ -271,8 +254,8 @@ btScalar Solver::wanted(const Row &row) {
 }
 
 void Solver::apply(const Row &row, btScalar impulse) {
-  add(row.a.response, impulse, row.a.velocity_changes, row.a.body_changes, row.a.count);
-  add(row.b.response, impulse, row.b.velocity_changes, row.b.body_changes, row.b.count);
+  add_impulse(row.a.response, impulse, row.a.velocity_changes, row.a.body_changes, row.a.count);
+  add_impulse(row.b.response, impulse, row.b.velocity_changes, row.b.body_changes, row.b.count);
 }
 
 // Solves one row within its limits; returns the change of relative velocity.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../shim/bullet_shim.h"
+#include "../shim/impulse.h"
 
 namespace {
 
@@ -547,6 +548,24 @@ void foreign_snapshots() {
   }
 }
 
+// With and without SSE2, of all short lengths.
+void impulses() {
+  const int most = 9;
+  for (int count = 0; count <= most; ++count) {
+    Numbers response(most), changes(most), body_changes(most);
+    for (int i = 0; i < most; ++i) {
+      response[static_cast<size_t>(i)] = std::sin(1.0 + i) / 3;
+      changes[static_cast<size_t>(i)] = std::cos(2.0 + i) / 7;
+      body_changes[static_cast<size_t>(i)] = std::exp(0.1 * i) / 9;
+    }
+    Numbers plain = changes, plain_body = body_changes;
+    bs::add_impulse(response.data(), 0.1, changes.data(), body_changes.data(), count);
+    bs::add_impulse_plain(response.data(), 0.1, plain.data(), plain_body.data(), count);
+    CHECK(same_bits(changes, plain));
+    CHECK(same_bits(body_changes, plain_body));
+  }
+}
+
 void threads() {
   auto simulate = [](Numbers &out) {
     World world(settings());
@@ -577,6 +596,7 @@ int main() {
   continuation(false, 500, 1500);
   continuation(true, 1e6, 1500);  // so wide that Bullet stops updating its box and moves it to the tree of fixed objects
   foreign_snapshots();
+  impulses();
   threads();
   std::printf("%d passed, %d failed\n", passed.load(), failed.load());
   return failed == 0 ? 0 : 1;

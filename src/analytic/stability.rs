@@ -218,7 +218,6 @@ mod tests {
 
     use super::super::tests::robot;
     use super::*;
-    use crate::engine::{BulletEngine, Engine};
     use crate::model::{Damping, Extensions, Laminate, PointMass, StickSlip};
 
     #[test]
@@ -311,8 +310,11 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "bullet")]
     /// Largest rate (rad/s) later than a tenth of `steps` steps after a kick by the voltages of the first step.
     fn later_rate(robot: &Robot, h: f64, steps: usize) -> f64 {
+        use crate::engine::{BulletEngine, Engine};
+
         let mut engine = BulletEngine::new(robot, h).unwrap();
         let on: Vec<f64> = (0..robot.actuators).map(|i| 1e-3 * (1.0 - 2.0 * (i % 2) as f64)).collect();
         let mut largest = 0.0_f64;
@@ -330,6 +332,7 @@ mod tests {
     }
 
     /// With each effect a kick decays at 3 % below the limit and grows at 3 % above it, up to Bullet's limit of 100 rad/s.
+    #[cfg(feature = "bullet")]
     #[test]
     fn bullet_is_stable_just_below_the_stable_step_and_not_above_it_with_every_effect() {
         let base = Extensions::default();

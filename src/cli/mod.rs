@@ -10,6 +10,7 @@ mod man;
 mod output;
 mod plot;
 mod presets;
+#[cfg(feature = "bullet")]
 mod reproduce;
 mod run;
 mod sweep;
@@ -56,6 +57,7 @@ enum Command {
     Mjcf(export::Args),
     Animate(animate::Args),
     Crosscheck(crosscheck::Args),
+    #[cfg(feature = "bullet")]
     Reproduce(reproduce::Args),
     Diagnose(diagnose::Args),
     /// List the extensions of the model with their parameters.
@@ -82,16 +84,8 @@ enum Command {
     },
 }
 
-const VERSION: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    " (Bullet ",
-    env!("SFERS_BULLET_VERSION"),
-    " ",
-    env!("SFERS_BULLET_PRECISION"),
-    ", revision ",
-    env!("SFERS_GIT_REVISION"),
-    ")"
-);
+const VERSION: &str =
+    concat!(env!("CARGO_PKG_VERSION"), " (Bullet ", env!("SFERS_BULLET"), ", revision ", env!("SFERS_GIT_REVISION"), ")");
 
 /// What all subcommands need to know.
 #[derive(Debug, Clone, Copy)]
@@ -134,7 +128,7 @@ impl From<ConfigError> for Failure {
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Self {
         match error {
-            EngineError::Model(_) => Self::Usage(error.to_string()),
+            EngineError::Model(_) | EngineError::NoBullet => Self::Usage(error.to_string()),
             _ => Self::Simulation(error.to_string()),
         }
     }
@@ -203,6 +197,7 @@ pub fn main() -> ExitCode {
         Command::Mjcf(args) => export::run(export::Format::Mjcf, &args, options),
         Command::Plot(args) => plot::run(&args, options),
         Command::Animate(args) => animate::run(&args, options),
+        #[cfg(feature = "bullet")]
         Command::Reproduce(args) => reproduce::run(&args, options),
         Command::Crosscheck(args) => crosscheck::run(&args, options),
         Command::Diagnose(args) => diagnose::run(&args, options),

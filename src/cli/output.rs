@@ -111,7 +111,7 @@ pub fn manifest(experiment: &Experiment, step_choice: Option<&StepChoice>, wall_
         },
         "git_revision": env!("SFERS_GIT_REVISION"),
         "version": env!("CARGO_PKG_VERSION"),
-        "bullet": format!("{} {}", env!("SFERS_BULLET_VERSION"), env!("SFERS_BULLET_PRECISION")),
+        "bullet": env!("SFERS_BULLET"),
         // Nothing here is random.
         "seed": null,
         "interrupted": interrupted,

@@ -20,11 +20,13 @@ pub mod fit;
 mod intervals;
 pub mod names;
 pub mod observations;
+#[cfg(feature = "view")]
 mod picture;
 pub mod pipeline;
 pub mod plant;
 pub mod protocols;
 pub mod quality;
+#[cfg(feature = "view")]
 pub mod report;
 pub mod residual_tests;
 pub mod robot;

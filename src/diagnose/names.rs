@@ -2,7 +2,7 @@
 
 use super::diagnosis::{Adopted, Estimate};
 use crate::model::{Laminate, Robot};
-use crate::view::{digits_for, fixed};
+use crate::number::{digits_for, fixed};
 
 /// The name of a cause.
 pub fn cause(id: &str) -> String {

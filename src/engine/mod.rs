@@ -4,11 +4,13 @@
 //! with [`advance`](Engine::advance); between the two the state before the step can be observed. The loop over steps is [`experiment::run`](crate::experiment::run).
 
 mod affected;
+#[cfg(feature = "bullet")]
 mod bullet;
 mod energy;
 mod planar;
 
 pub use affected::AffectedEngine;
+#[cfg(feature = "bullet")]
 pub use bullet::BulletEngine;
 pub use energy::{EnergyAudit, EnergyBalance, EnergyFault, PlanarBase, TOLERANCE as ENERGY_TOLERANCE};
 pub(crate) use planar::NUMERICAL_DAMPING;
@@ -16,7 +18,6 @@ pub use planar::{FrictionModel, PlanarEngine};
 
 use thiserror::Error;
 
-use crate::bullet::BulletError;
 use crate::model::ModelError;
 
 /// Bullet's limit on the product of two friction coefficients, which the planar engine keeps for equal friction.
@@ -33,8 +34,14 @@ pub enum EngineError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// Bullet refused a call.
+    #[cfg(feature = "bullet")]
     #[error(transparent)]
-    Bullet(#[from] BulletError),
+    Bullet(#[from] crate::bullet::BulletError),
+    /// An experiment on Bullet, in a build without it.
+    #[error(
+        "this build has no Bullet, the default engine of experiment files: set simulation.engine = \"planar\", or build with the feature \"bullet\""
+    )]
+    NoBullet,
     /// The contact problem of a step was not solved.
     #[error(
         "contact was not solved in {iterations} iterations at step {step}, t = {time} s; try a smaller time step, or simulation.friction = \"convex\" for long chains"

@@ -28,7 +28,7 @@ pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};
 use crate::effects::{Applied, SignalChain};
-use crate::engine::{AffectedEngine, BulletEngine, Engine, EngineError, FrictionModel, PlanarEngine};
+use crate::engine::{AffectedEngine, Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::model::{Mount, Robot};
 use crate::recording::{GroundMeta, Meta, definitions};
 
@@ -96,14 +96,17 @@ impl Experiment {
     /// Builds the engine that the experiment asks for.
     ///
     /// # Errors
-    /// [`EngineError`] if the robot cannot be built.
+    /// [`EngineError`] if the robot cannot be built; [`EngineError::NoBullet`] for Bullet in a build without it.
     pub fn engine(&self) -> Result<Box<dyn Engine>, EngineError> {
         let mut chain = SignalChain::new(&self.effects, self.robot.actuators, self.steps as f64 * self.time_step);
         let mut voltages = vec![0.0; self.robot.actuators];
         self.drive.voltages(0.0, &mut voltages);
         chain.settle(&mut voltages);
         let engine: Box<dyn Engine> = match self.engine {
-            EngineKind::Bullet => Box::new(BulletEngine::new(&self.robot, self.time_step)?),
+            #[cfg(not(feature = "bullet"))]
+            EngineKind::Bullet => return Err(EngineError::NoBullet),
+            #[cfg(feature = "bullet")]
+            EngineKind::Bullet => Box::new(crate::engine::BulletEngine::new(&self.robot, self.time_step)?),
             EngineKind::Planar => {
                 let mut engine = match self.numerical_damping {
                     Some(damping) => PlanarEngine::with_numerical_damping(&self.robot, self.time_step, damping)?,

@@ -61,5 +61,5 @@ fn box_inertia(mass: f64, [x, y, z]: [f64; 3]) -> [f64; 3] {
 
 /// Text for an XML comment, which must not contain two successive hyphens.
 fn comment(text: &str) -> String {
-    crate::view::escape(&text.replace("--", "- -"))
+    crate::xml::escape(&text.replace("--", "- -"))
 }

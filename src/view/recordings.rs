@@ -9,7 +9,8 @@ use crate::recording::Recording;
 use crate::words;
 
 /// Kinds of figures of a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Kind {
     /// The robot's shape at some times.
     Shapes,

@@ -2,6 +2,9 @@
 
 use std::sync::OnceLock;
 
+pub(super) use crate::number::minus as minus_signs;
+pub(crate) use crate::xml::escape;
+
 /// Fonts of an SVG. The layout assumes the first, which PNG, PDF and GIF embed; the others are narrower.
 pub(super) const FAMILY: &str = "'DejaVu Sans', Arial, Helvetica, sans-serif";
 
@@ -71,30 +74,6 @@ pub(super) fn significant(value: f64, digits: i32) -> String {
     let places = (digits - 1 - power).max(0) as usize;
     let text = format!("{value:.places$}").replace('-', "−");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// Replaces hyphens before numbers by minus signs, in "-1500 V" but not in "jump-14hz".
-pub(super) fn minus_signs(text: &str) -> String {
-    let chars: Vec<char> = text.chars().collect();
-    let before = |i: usize| i == 0 || !(chars[i - 1].is_alphanumeric() || ")]_-".contains(chars[i - 1]));
-    let after = |i: usize| chars.get(i + 1).is_some_and(|c| c.is_ascii_digit() || *c == '.');
-    chars.iter().enumerate().map(|(i, &c)| if c == '-' && before(i) && after(i) { '−' } else { c }).collect()
-}
-
-/// Escapes a text for XML and removes control characters, which XML does not allow.
-pub(crate) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => {}
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

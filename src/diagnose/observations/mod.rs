@@ -3,9 +3,11 @@
 //! A few numbers allow no held-out set and cannot identify a cause; they rule causes out and show which are tied.
 
 mod config;
+#[cfg(feature = "view")]
 mod page;
 
 pub(super) use config::{ObservationError, check};
+#[cfg(feature = "view")]
 pub use page::page;
 
 use super::DiagnoseError;
@@ -16,7 +18,7 @@ use super::fit::{Convergence, Estimator, Fit};
 use super::names;
 use super::plant::{Candidate, Model, Plant, Signal, Term};
 use crate::experiment::{self, Control, EffectConfig, Source};
-use crate::view::fixed;
+use crate::number::fixed;
 use config::config;
 
 /// Largest χ² per number of a model that explains them: 2 σ (rms).

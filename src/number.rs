@@ -8,7 +8,7 @@ pub const NONE: &str = "–";
 /// `value` with `digits` after the point.
 ///
 /// ```
-/// use sfers::view::fixed;
+/// use sfers::number::fixed;
 /// assert_eq!(fixed(-18.994, 2), "−18.99");
 /// assert_eq!(fixed(-0.001, 2), "0.00");
 /// assert_eq!(fixed(f64::NAN, 2), "–");
@@ -25,7 +25,7 @@ pub fn fixed(value: f64, digits: usize) -> String {
 /// As [`fixed`], with a plus sign before positive values, for differences.
 ///
 /// ```
-/// use sfers::view::signed;
+/// use sfers::number::signed;
 /// assert_eq!((signed(0.5, 1), signed(-0.5, 1), signed(-0.01, 1)), ("+0.5".into(), "−0.5".into(), "0.0".into()));
 /// ```
 pub fn signed(value: f64, digits: usize) -> String {
@@ -37,7 +37,7 @@ pub fn signed(value: f64, digits: usize) -> String {
 /// `value` with `count` significant digits, as a power of ten below 10⁻⁵ and from 10⁷.
 ///
 /// ```
-/// use sfers::view::significant;
+/// use sfers::number::significant;
 /// assert_eq!(significant(-0.0123456, 3), "−0.0123");
 /// assert_eq!(significant(18123.0, 3), "18123");
 /// assert_eq!(significant(4.2e-9, 2), "4.2·10⁻⁹");
@@ -72,11 +72,14 @@ pub fn digits_for(spread: f64) -> usize {
 /// A text with true minus signs for the hyphens before numbers; hyphens within words are kept.
 ///
 /// ```
-/// use sfers::view::minus;
+/// use sfers::number::minus;
 /// assert_eq!(minus("step-1000v: (-3.5 to -.2)"), "step-1000v: (−3.5 to −.2)");
 /// ```
 pub fn minus(text: &str) -> String {
-    super::text::minus_signs(text)
+    let chars: Vec<char> = text.chars().collect();
+    let before = |i: usize| i == 0 || !(chars[i - 1].is_alphanumeric() || ")]_-".contains(chars[i - 1]));
+    let after = |i: usize| chars.get(i + 1).is_some_and(|c| c.is_ascii_digit() || *c == '.');
+    chars.iter().enumerate().map(|(i, &c)| if c == '-' && before(i) && after(i) { '−' } else { c }).collect()
 }
 
 #[cfg(test)]
