@@ -75,6 +75,7 @@ pub mod keys;
 pub mod model;
 pub mod recording;
 pub mod reproduce;
+pub mod simulation;
 pub mod sweep;
 pub mod view;
 mod words;

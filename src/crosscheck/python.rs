@@ -141,7 +141,7 @@ pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, String> {
     } else {
         return Err("the material is neither parameter set 2 nor 4".into());
     };
-    if robot.positive_gain != 1.0 {
+    if experiment.drive.positive_gain != 1.0 {
         return Err("positive_gain is not 1".into());
     }
     let mut settings = json!({

@@ -274,7 +274,8 @@ impl Dataset {
                 return Err(wrong(&at("id"), format!("id: two runs are called {:?}", entry.id)));
             }
             let file = path.parent().unwrap_or(Path::new("")).join(&entry.file);
-            let (times, voltages, channels, remarks) = read_run(&file, &robot, &markers)?;
+            let (times, voltages, channels, remarks) =
+                read_run(&file, &robot, nominal.robot.positive_gain.unwrap_or(1.0), &markers)?;
             let run = MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks };
             runs.push(run.checked(&robot)?);
         }
@@ -387,10 +388,10 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
 
 type RunData = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>, Vec<String>);
 
-fn read_run(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<RunData, DataError> {
+fn read_run(path: &Path, robot: &Robot, positive_gain: f64, markers: &[Marker]) -> Result<RunData, DataError> {
     let bytes =
         crate::files::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
-    parse_run(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage)).map_err(
+    parse_run(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage, positive_gain)).map_err(
         |Wrong { line, column, reason }| match line {
             0 => DataError::Unreadable { path: path.into(), reason },
             _ => DataError::Content { path: path.into(), line, column, reason },
