@@ -82,6 +82,7 @@ pub mod number;
 pub mod recording;
 #[cfg(all(feature = "bullet", feature = "view"))]
 pub mod reproduce;
+pub mod simulation;
 pub mod sweep;
 #[cfg(feature = "view")]
 pub mod view;

@@ -76,7 +76,6 @@ mod tests {
             mount,
             damping: Damping::Eta(damping),
             collision_thickness: 0.1,
-            positive_gain: 1.0,
             friction: Friction { ground: 1.0, low: 1.0, high: 1.0, film: Film::None, film_fraction: 0.5 },
             bodies: None,
             extensions: Extensions::default(),

@@ -140,7 +140,7 @@ pub fn authors_run(experiment: &Experiment) -> Result<AuthorsRun, CrosscheckErro
     } else {
         return Err(no_class("the material is neither parameter set 2 nor 4"));
     };
-    if robot.positive_gain != 1.0 {
+    if experiment.drive.positive_gain != 1.0 {
         return Err(no_class("positive_gain is not 1"));
     }
     let mut settings = json!({

@@ -62,12 +62,13 @@ impl RobotPlant {
     /// The plant of a data set, with the noise and masks that [`quality::check`] returned for it.
     pub fn new(dataset: &Dataset, checked: &quality::Checked) -> Self {
         let robot = dataset.robot.clone();
+        let gain = dataset.nominal.robot.positive_gain.unwrap_or(1.0);
         let (mut commands, mut signals, mut starts, mut steps) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (run, masks) in dataset.runs.iter().zip(&checked.runs) {
             let n = robot.actuators;
             let start = run.times[0];
             let times: Vec<f64> = run.times.iter().map(|t| t - start).collect();
-            let volts: Vec<f64> = run.voltages.iter().map(|v| if *v > 0.0 { v * robot.positive_gain } else { *v }).collect();
+            let volts: Vec<f64> = run.voltages.iter().map(|v| if *v > 0.0 { v * gain } else { *v }).collect();
             commands.push(Command::new(&times, &volts, n));
             let mut signal = Signal {
                 id: run.id.clone(),

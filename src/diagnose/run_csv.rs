@@ -28,19 +28,19 @@ pub(super) struct Rows {
     pub remarks: Vec<String>,
 }
 
-/// Reads the run of a robot with `markers`.
+/// Reads the run of a robot with `markers`; `positive_gain` is the factor on positive voltages.
 ///
 /// # Errors
 /// [`DataError`] with line and column.
-pub(super) fn read(path: &Path, robot: &Robot, markers: &[Marker]) -> Result<Rows, DataError> {
+pub(super) fn read(path: &Path, robot: &Robot, positive_gain: f64, markers: &[Marker]) -> Result<Rows, DataError> {
     let bytes =
         crate::files::read(path).map_err(|error| DataError::Unreadable { path: path.into(), reason: error.to_string() })?;
-    parse(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage)).map_err(|Wrong { line, column, reason }| {
-        match line {
+    parse(&bytes, robot.actuators, markers, |voltage| robot.check_voltage(voltage, positive_gain)).map_err(
+        |Wrong { line, column, reason }| match line {
             0 => DataError::Unreadable { path: path.into(), reason },
             _ => DataError::Content { path: path.into(), line, column, reason },
-        }
-    })
+        },
+    )
 }
 
 /// What is wrong in a run's file.

@@ -1,5 +1,8 @@
 //! Gaits: sequences in which actuators are switched on, as data.
 
+/// Voltages of the reference's five actuators when they are on (V).
+pub const DEFAULT_ON_VOLTAGES: [f64; 5] = [520.0, 520.0, -1500.0, 520.0, 520.0];
+
 /// Where a phase ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {

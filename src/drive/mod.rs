@@ -3,12 +3,16 @@
 //! A positive voltage bends an actuator's far end up, a negative one down. The piezo can take −1500 V to +520 V in the reference's
 //! model; the real robot was driven with +300 V where the model applies +520 V, which `positive_gain = 1.733` expresses.
 
+mod check;
 pub mod gait;
 mod table;
 
+pub use check::DriveError;
+pub(crate) use check::check_positive_gain;
 pub use gait::Gait;
 pub use table::Table;
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// Share of a time that sums of a few times err by at most.
@@ -65,6 +69,42 @@ pub struct Drive {
 }
 
 impl Drive {
+    /// A waveform as it is, without gain or delay.
+    pub fn new(waveform: Waveform) -> Self {
+        Self { waveform, positive_gain: 1.0, delay: 0.0 }
+    }
+
+    /// Constant voltages (V), one per actuator.
+    pub fn dc(voltages: impl Into<Vec<f64>>) -> Self {
+        Self::new(Waveform::Dc(voltages.into()))
+    }
+
+    /// `V = A/2 (1 − cos 2πft)` with an amplitude A (V) per actuator and the frequency f (Hz).
+    pub fn sine(amplitudes: impl Into<Vec<f64>>, frequency: f64) -> Self {
+        Self::new(Waveform::Sine { amplitudes: amplitudes.into(), frequency })
+    }
+
+    /// A gait by its name, with its period, delay or on-time (s), at [`gait::DEFAULT_ON_VOLTAGES`].
+    ///
+    /// # Errors
+    /// [`DriveError::UnknownGait`].
+    pub fn gait(name: &str, parameter: f64) -> Result<Self, DriveError> {
+        let gait = gait::find(name).ok_or_else(|| DriveError::UnknownGait(name.into()))?;
+        Ok(Self::new(Waveform::Gait { gait, parameter, on_voltages: gait::DEFAULT_ON_VOLTAGES.to_vec() }))
+    }
+
+    /// With a factor on positive voltages (–).
+    #[must_use]
+    pub fn with_positive_gain(self, positive_gain: f64) -> Self {
+        Self { positive_gain, ..self }
+    }
+
+    /// With a delay (s).
+    #[must_use]
+    pub fn with_delay_s(self, delay: f64) -> Self {
+        Self { delay, ..self }
+    }
+
     /// Writes the voltages (V) that reach the torque law at time `t` (s) to `out`, one per actuator.
     pub fn voltages(&self, t: f64, out: &mut [f64]) {
         let t = if self.delay == 0.0 { t } else { (t - self.delay).max(0.0) };
@@ -105,7 +145,7 @@ impl Drive {
         }
     }
 
-    /// Whether voltages change by jumps only.
+    /// True if voltages change by jumps only.
     fn jumps(&self) -> bool {
         !matches!(self.waveform, Waveform::Sine { .. } | Waveform::Table(_))
     }
@@ -158,32 +198,42 @@ impl Drive {
 /// The mean voltages of a drive over stretches of time that follow on each other.
 #[derive(Debug, Clone)]
 pub struct Means<'a> {
-    drive: &'a Drive,
+    drive: Cow<'a, Drive>,
     /// Voltages at the start of the coming stretch (V), and until when (s) they hold.
     start: Vec<f64>,
     until: f64,
 }
 
 impl<'a> Means<'a> {
-    /// Of `drive` for so many actuators, from the time `start` (s) on.
+    /// Of `drive` for a number of actuators, from the time `start` (s) on.
     pub fn new(drive: &'a Drive, actuators: usize, start: f64) -> Self {
-        let mut voltages = vec![0.0; actuators];
-        drive.voltages(start, &mut voltages);
-        Self { drive, start: voltages, until: drive.holds_until(start) }
+        Self::of(Cow::Borrowed(drive), actuators, start)
+    }
+
+    pub(crate) fn of(drive: Cow<'a, Drive>, actuators: usize, start: f64) -> Self {
+        let mut means = Self { drive, start: vec![0.0; actuators], until: start };
+        means.restart(start);
+        means
+    }
+
+    /// Begins anew at the time `start` (s).
+    pub(crate) fn restart(&mut self, start: f64) {
+        self.drive.voltages(start, &mut self.start);
+        self.until = self.drive.holds_until(start);
     }
 
     /// The drive itself.
-    pub(crate) fn drive(&self) -> &'a Drive {
-        self.drive
+    pub(crate) fn drive(&self) -> &Drive {
+        &self.drive
     }
 
     /// Mean voltages (V) from `from` to `to` (s) into `out`: a jump within counts from its moment on, what changes smoothly is taken at the
     /// middle, and a table's lines are integrated.
     pub fn over(&mut self, from: f64, to: f64, out: &mut [f64]) {
-        let drive = self.drive;
         if to < self.until {
             return out.copy_from_slice(&self.start);
         }
+        let drive = self.drive.as_ref();
         if !drive.jumps() {
             return drive.mean_without_jump(from, to, out);
         }
@@ -218,8 +268,7 @@ mod tests {
 
     #[test]
     fn the_mean_over_a_step_counts_a_jump_from_its_moment_on() {
-        let drive =
-            Drive { waveform: Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }, positive_gain: 2.0, delay: 0.0 };
+        let drive = Drive::new(Waveform::Step { voltages: vec![-1000.0, 300.0], at: 0.3 }).with_positive_gain(2.0);
         let (mut means, mut mean) = (Means::new(&drive, 2, 0.0), vec![f64::NAN; 2]);
         means.over(0.0, 0.1, &mut mean);
         assert_eq!(mean, [0.0, 0.0]);
@@ -227,7 +276,7 @@ mod tests {
         assert!((mean[0] + 500.0).abs() < 1e-9 && (mean[1] - 300.0).abs() < 1e-9, "{mean:?}");
         means.over(0.5, 0.6, &mut mean);
         assert_eq!(mean, [-1000.0, 600.0]);
-        let sine = Drive { waveform: Waveform::Sine { amplitudes: vec![-2.0], frequency: 1.0 }, positive_gain: 1.0, delay: 0.0 };
+        let sine = Drive::sine([-2.0], 1.0);
         Means::new(&sine, 1, 0.2).over(0.2, 0.3, &mut mean[..1]);
         assert!((mean[0] + 1.0).abs() < 1e-12);
     }
@@ -244,7 +293,7 @@ mod tests {
             [sequence(None), sequence(Some(0.07)), sequence(Some(0.2)), Waveform::Step { voltages: vec![7.0; 5], at: 0.1 }];
         for waveform in gaits.chain(others) {
             for delay in [0.0, 0.0123] {
-                let drive = Drive { waveform: waveform.clone(), positive_gain: 1.0, delay };
+                let drive = Drive::new(waveform.clone()).with_delay_s(delay);
                 let of = |t: f64| {
                     let mut out = [f64::NAN; 5];
                     drive.voltages(t, &mut out);
@@ -261,7 +310,7 @@ mod tests {
 
     fn at(waveform: Waveform, gain: f64, t: f64) -> Vec<f64> {
         let mut out = vec![f64::NAN; 2];
-        Drive { waveform, positive_gain: gain, delay: 0.0 }.voltages(t, &mut out);
+        Drive::new(waveform).with_positive_gain(gain).voltages(t, &mut out);
         out
     }
 

@@ -5,19 +5,11 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::adaptive::{self, LONGEST, StepCount, Stopped};
-use super::config::{Config, Fault, StepConfig};
-use super::resolve::Trouble;
 use super::run::{Control, Run};
 use super::{EngineKind, Experiment};
-use crate::engine::{Engine, EngineError, FrictionModel};
+use crate::engine::{Engine, EngineError};
 use crate::model::Mount;
-use crate::recording::definitions;
-use crate::words::{not_one_of, number};
 
-/// Share of the result that a tighter tolerance may change, where a file does not say.
-pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
-/// Times of records are multiples of this (s) or less.
-const GRID: f64 = 1e-4;
 /// The loosest tolerance, as a share of the robot's length for an allowed error of one, the least such share to begin with, and the factor to the next. On the
 /// floor results err with about the square root of the tolerance (measured: 2 to 3 times less with a tenth), so it goes with the square of the error.
 const LOOSEST: f64 = 0.02;
@@ -81,54 +73,6 @@ pub struct StepChoice {
     pub longest_step_s: f64,
     /// All runs; the last is the one whose results are given.
     pub trials: Vec<StepTrial>,
-}
-
-/// Resolves a config with `time_step_s = "auto"`: the experiment's time step is that of its records.
-pub(super) fn resolve(config: &Config, resolve: impl Fn(&Config) -> Result<Experiment, Trouble>) -> Result<Experiment, Trouble> {
-    let s = &config.simulation;
-    let error = s.step_error.unwrap_or(DEFAULT_STEP_ERROR);
-    if !(error > 0.0 && error < 1.0) {
-        return Err(Fault::new("simulation.step_error", format!("is {}, but must lie between 0 and 1", number(error))).into());
-    }
-    if let Some(name) = &s.step_measure
-        && !definitions::names().contains(&name.as_str())
-    {
-        return Err(Fault::new("simulation.step_measure", not_one_of(name, &definitions::names())).into());
-    }
-    let Some(duration) = s.duration_s else {
-        return Err(Fault::new("simulation.duration_s", "is missing; time_step_s = \"auto\" does not go with steps").into());
-    };
-    let mut fixed = config.clone();
-    fixed.simulation.time_step_s = Some(StepConfig::Seconds(record_grid(duration, s.record_every_s)));
-    (fixed.simulation.step_error, fixed.simulation.step_measure) = (None, None);
-    let mut experiment = resolve(&fixed)?;
-    if experiment.robot.mount == Mount::Ground && experiment.friction == FrictionModel::Convex {
-        let message =
-            "convex does not go with time_step_s = \"auto\": its error depends on the step; give one in seconds, or take coulomb";
-        return Err(Fault::new("simulation.friction", message).into());
-    }
-    if crate::effects::time_step_scale(&experiment.effects) != 1.0 {
-        let message = "auto does not go with the effect discretisation's time_step_scale";
-        return Err(Fault::new("simulation.time_step_s", message).into());
-    }
-    if s.record_from_step.is_none() {
-        // The reference's records are a step before the multiples of their interval, which is nothing with short steps.
-        experiment.record_from = experiment.record_every.min(experiment.steps - 1);
-    }
-    experiment.accuracy = Some(Accuracy { measure: s.step_measure.clone(), error });
-    experiment.config = config.clone();
-    Ok(experiment)
-}
-
-/// Time (s) of which all times of records are multiples, [`GRID`] or less: a part of the duration, and of the time between records if that goes into the duration.
-/// Values that are none are told by the check of the experiment.
-fn record_grid(duration: f64, every: Option<f64>) -> f64 {
-    let every = every.filter(|every| *every > 0.0);
-    let goes_into_duration = |part: &f64| (duration / part - (duration / part).round()).abs() < 1e-6;
-    every.map(|every| every / (every / GRID).ceil()).filter(goes_into_duration).unwrap_or_else(|| {
-        let longest = duration / (duration / LONGEST).ceil();
-        longest / (longest / every.unwrap_or(GRID).min(GRID)).ceil()
-    })
 }
 
 /// What a run gives to compare.

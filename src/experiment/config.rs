@@ -58,6 +58,12 @@ pub(super) struct Fault {
     pub message: String,
 }
 
+impl From<Fault> for ConfigError {
+    fn from(Fault { key, message }: Fault) -> Self {
+        Self::Value { place: "the config".into(), key, message }
+    }
+}
+
 impl Fault {
     pub fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
         Self { key: key.into(), message: message.into() }
@@ -351,9 +357,9 @@ impl Source {
         })
     }
 
-    /// Says where a key's value came from.
-    pub(super) fn locate(&self, fault: Fault) -> ConfigError {
-        let Fault { key, message } = fault;
+    /// Puts the place that a key's value came from into an error about it.
+    pub(super) fn locate(&self, error: ConfigError) -> ConfigError {
+        let ConfigError::Value { key, message, .. } = error else { return error };
         let set = self.settings.iter().rev().find(|set| set.key == key);
         let place = match (set, line_of(&self.text, key.split('.'))) {
             (Some(set), _) => set.place.clone(),
@@ -430,7 +436,7 @@ mod tests {
     #[test]
     fn a_fault_is_placed_at_the_key_or_else_at_its_table() {
         let source = Source::from_text("a.toml", TEXT);
-        let place = |key: &str| source.locate(Fault::new(key, "wrong")).to_string();
+        let place = |key: &str| source.locate(Fault::new(key, "wrong").into()).to_string();
         assert_eq!(place("robot.friction.low"), "a.toml, line 5: robot.friction.low: wrong");
         assert_eq!(place("robot.actuators"), "a.toml, line 2: robot.actuators: wrong");
         assert_eq!(place("robot.mount"), "a.toml, line 1: robot.mount: wrong");

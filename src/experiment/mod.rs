@@ -3,7 +3,6 @@
 mod adaptive;
 mod auto;
 mod config;
-mod drive_csv;
 pub mod presets;
 mod range;
 mod resolve;
@@ -11,8 +10,6 @@ mod run;
 mod spec;
 mod state;
 
-#[cfg(test)]
-pub(crate) use auto::DEFAULT_STEP_ERROR;
 pub use auto::{Accuracy, StepChoice, StepTrial};
 pub(crate) use config::line_of;
 pub use config::{
@@ -21,9 +18,11 @@ pub use config::{
 };
 pub use range::Bending;
 pub(crate) use range::{step_too_long, unstable};
+#[cfg(test)]
+pub(crate) use resolve::DEFAULT_STEP_ERROR;
 pub use resolve::{experiment, with_bodies};
 pub use run::{Control, Run, run};
-pub(crate) use run::{hermite, hermite_at};
+pub(crate) use run::{Supply, hermite, hermite_at};
 pub use state::SavedState;
 
 use crate::drive::{Drive, Waveform};

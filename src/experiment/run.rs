@@ -1,9 +1,11 @@
 //! The loop over steps.
 
+use std::borrow::Cow;
+
 use super::range::{self, Bending, CLEARLY};
 use super::{Experiment, StepChoice, auto};
 use crate::analytic;
-use crate::drive::{Means, Waveform};
+use crate::drive::{Drive, Means, Waveform};
 use crate::effects::View;
 use crate::engine::{ClampHits, EnergyAudit, EnergyBalance, Engine, EngineError};
 use crate::recording::Recording;
@@ -116,7 +118,6 @@ pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut
     let mut sampled = Every::new(start, every);
     let mut bent = Every::new(start, if midpoint { BEND_EVERY_SAMPLES * every } else { 1 });
     let mut observed = Every::new(start, observe_every);
-    let mut time = done.saturating_sub(1) as f64 * experiment.time_step;
     let mut supply = Supply::new(experiment, engine, done as f64 * experiment.time_step);
     let mut interrupted = false;
     while done < experiment.steps {
@@ -124,13 +125,8 @@ pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut
             interrupted = true;
             break;
         }
-        let before = time;
-        time = done as f64 * experiment.time_step;
-        if midpoint {
-            supply.prepare(engine, done, experiment.time_step)?;
-        } else {
-            supply.prepare_at(engine, before)?;
-        }
+        let time = done as f64 * experiment.time_step;
+        supply.prepare(engine, done, experiment.time_step)?;
         if let Some(audit) = &mut observation.audit {
             audit.take(time, engine)?;
         }
@@ -152,9 +148,11 @@ pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut
 }
 
 /// The voltages of an experiment, for an engine that works at the middle of steps or one that works at their start.
-pub(super) struct Supply<'a> {
+pub(crate) struct Supply<'a> {
     means: Means<'a>,
     voltages: Vec<f64>,
+    /// True of an engine that works at the middle of steps.
+    midpoint: bool,
     /// Parts into which a step is cut for the engine, and their voltages.
     parts: usize,
     pieces: Vec<f64>,
@@ -163,15 +161,33 @@ pub(super) struct Supply<'a> {
 impl<'a> Supply<'a> {
     /// From the time `start` (s) on.
     pub(super) fn new(experiment: &'a Experiment, engine: &dyn Engine, start: f64) -> Self {
-        let actuators = experiment.robot.actuators;
-        // A smooth drive needs no parts.
-        let parts = if matches!(experiment.drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
-        let means = Means::new(&experiment.drive, actuators, start);
-        Self { means, voltages: vec![0.0; actuators], parts, pieces: vec![0.0; parts * actuators] }
+        Self::of(Cow::Borrowed(&experiment.drive), engine, start)
     }
 
-    /// Gives the engine the voltages of a step of `time_step` (s), which begins where the one before ended.
-    fn prepare(&mut self, engine: &mut dyn Engine, step: u64, time_step: f64) -> Result<(), EngineError> {
+    pub(crate) fn of(drive: Cow<'a, Drive>, engine: &dyn Engine, start: f64) -> Self {
+        let actuators = engine.actuators();
+        // A smooth drive needs no parts.
+        let parts = if matches!(drive.waveform, Waveform::Sine { .. }) { 1 } else { engine.parts() };
+        Self {
+            means: Means::of(drive, actuators, start),
+            voltages: vec![0.0; actuators],
+            midpoint: engine.midpoint(),
+            parts,
+            pieces: vec![0.0; parts * actuators],
+        }
+    }
+
+    /// Begins anew at the time `start` (s).
+    pub(crate) fn restart(&mut self, start: f64) {
+        self.means.restart(start);
+    }
+
+    /// Gives the engine the voltages of a step of `time_step` (s), which begins where the one before ended: their means over the step for an engine
+    /// that works at its middle, those of the time of the step before for another, as in the reference.
+    pub(crate) fn prepare(&mut self, engine: &mut dyn Engine, step: u64, time_step: f64) -> Result<(), EngineError> {
+        if !self.midpoint {
+            return self.prepare_at(engine, step.saturating_sub(1) as f64 * time_step);
+        }
         let from = step as f64 * time_step;
         if self.parts == 1 {
             self.means.over(from, (step + 1) as f64 * time_step, &mut self.voltages);

@@ -35,7 +35,7 @@ impl Experiment {
             "damping_eta": eta,
             "damping_time": time,
             "collision_thickness": self.robot.collision_thickness,
-            "positive_gain": self.robot.positive_gain,
+            "positive_gain": self.drive.positive_gain,
             "friction": {
                 "ground": f.ground, "low": f.low, "high": f.high,
                 "film": match f.film { Film::BothEnds => "both-ends", Film::RightEnd => "right-end", Film::None => "none" },

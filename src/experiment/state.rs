@@ -55,18 +55,24 @@ impl SavedState {
     pub fn parse(text: &str, experiment: &Experiment) -> Result<Self, String> {
         let saved: Self =
             serde_json::from_str(text).map_err(|error| format!("not a saved state: {}", words::json_error(&error)))?;
-        if saved.schema != 1 {
-            return Err(format!("a state of schema {}, but this program reads schema 1", saved.schema));
+        saved.check(experiment)?;
+        Ok(saved)
+    }
+
+    /// Checks that it is a state of `experiment`'s robot.
+    pub(crate) fn check(&self, experiment: &Experiment) -> Result<(), String> {
+        if self.schema != 1 {
+            return Err(format!("a state of schema {}, but this program reads schema 1", self.schema));
         }
-        if let Some(at) = saved.state.iter().position(|value| value.abs() > LARGEST) {
-            return Err(format!("number {} of the state is {:e}: no robot comes into such a state", at + 1, saved.state[at]));
+        if let Some(at) = self.state.iter().position(|value| value.abs() > LARGEST) {
+            return Err(format!("number {} of the state is {:e}: no robot comes into such a state", at + 1, self.state[at]));
         }
         let Value::Object(needed) = robot(experiment) else { return Err("no robot".into()) };
-        match needed.iter().find(|(key, value)| saved.robot.get(key) != Some(value)) {
+        match needed.iter().find(|(key, value)| self.robot.get(key) != Some(value)) {
             Some((key, value)) => {
-                Err(format!("saved with another {key}: {} there, {value} here", saved.robot.get(key).unwrap_or(&Value::Null)))
+                Err(format!("saved with another {key}: {} there, {value} here", self.robot.get(key).unwrap_or(&Value::Null)))
             }
-            None => Ok(saved),
+            None => Ok(()),
         }
     }
 

@@ -20,7 +20,7 @@ pub fn sidecar(experiment: &Experiment, command: &str) -> Value {
         "rest_angle_per_volt_rad_per_v": joint.rest_angle_per_volt,
         "damping_time_s": joint.damping_time,
         "joint_damping_dyn_cm_s_per_rad": joint.stiffness * joint.damping_time,
-        "positive_gain": robot.positive_gain,
+        "positive_gain": experiment.drive.positive_gain,
         "mount": robot.mount.name(),
         "gravity_cm_s2": robot.material.gravity,
         "floor": (robot.mount == Mount::Ground).then(|| json!({"height_cm": -0.5 * robot.collision_thickness, "friction": robot.friction.ground})),

@@ -11,6 +11,7 @@
 //! | first frequency of the cantilever (Euler-Bernoulli) | 18.1 Hz | 24.0 Hz | 23 Hz measured, 25 Hz simulated |
 //! | static tip at −1000 V, m = 3 | −19.0 mm | −23.4 mm | −20 mm |
 
+mod builder;
 mod extensions;
 mod laminate;
 mod robot;
@@ -47,7 +48,7 @@ const LARGEST: f64 = 1e20;
 
 impl ModelError {
     /// `value` is in CGS units.
-    fn unless(holds: bool, key: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
+    pub(crate) fn unless(holds: bool, key: &'static str, value: f64, needed: &'static str) -> Result<(), Self> {
         // Infinity stands for "no limit" where it is allowed.
         let computable = value == 0.0 || value.is_infinite() || (1.0 / LARGEST..=LARGEST).contains(&value.abs());
         let needed = if holds && !computable { "of a size between 1e-20 and 1e20 in CGS units" } else { needed };

@@ -95,8 +95,6 @@ pub struct Robot {
     pub damping: Damping,
     /// Thickness of the collision boxes (cm). It sets contact and inertia; the laminate itself is thinner.
     pub collision_thickness: f64,
-    /// Factor on positive voltages before the torque law (–).
-    pub positive_gain: f64,
     /// Friction coefficients and films.
     pub friction: Friction,
     /// The N·m + 1 bodies, where they were read from a file instead of following from the fields above.
@@ -224,12 +222,12 @@ impl Robot {
         (self.motors_per_actuator as f64 * self.friction.film_fraction + 0.5).ceil() as usize
     }
 
-    /// Checks that the material bears a commanded voltage (V), with the robot's factor on positive ones.
+    /// Checks that the material bears a commanded voltage (V) with the factor `positive_gain` (–) on positive ones.
     ///
     /// # Errors
     /// What is wrong with it, as the end of a sentence that begins with the key.
-    pub fn check_voltage(&self, voltage: f64) -> Result<(), String> {
-        let (applied, gain) = if voltage > 0.0 { (voltage * self.positive_gain, self.positive_gain) } else { (voltage, 1.0) };
+    pub fn check_voltage(&self, voltage: f64, positive_gain: f64) -> Result<(), String> {
+        let (applied, gain) = if voltage > 0.0 { (voltage * positive_gain, positive_gain) } else { (voltage, 1.0) };
         let limit = self.material.max_voltage();
         if applied.abs() <= limit {
             return Ok(());
@@ -272,11 +270,8 @@ impl Robot {
         ] {
             ModelError::unless(value.is_finite() && value >= 0.0, key, value, "zero or more")?;
         }
-        for (key, value) in
-            [("robot.collision_thickness_mm", self.collision_thickness), ("robot.positive_gain", self.positive_gain)]
-        {
-            ModelError::unless(value.is_finite() && value > 0.0, key, value, "positive")?;
-        }
+        let thickness = self.collision_thickness;
+        ModelError::unless(thickness.is_finite() && thickness > 0.0, "robot.collision_thickness_mm", thickness, "positive")?;
         if let Some(bodies) = &self.bodies {
             let count = bodies.len() as f64;
             ModelError::unless(
@@ -307,19 +302,8 @@ impl Robot {
 mod tests {
     use super::*;
 
-    pub(crate) fn robot(actuators: usize, motors: usize, film: Film) -> Robot {
-        Robot {
-            material: Material::PARAMETER_2,
-            actuators,
-            motors_per_actuator: motors,
-            mount: Mount::Ground,
-            damping: Damping::Eta(0.045),
-            collision_thickness: 0.1,
-            positive_gain: 1.0,
-            friction: Friction { ground: 1.0, low: 0.2, high: 4.0, film, film_fraction: 0.5 },
-            bodies: None,
-            extensions: Extensions::default(),
-        }
+    fn robot(actuators: usize, motors: usize, film: Film) -> Robot {
+        Robot::crawler().with_actuators(actuators).with_motors_per_actuator(motors).with_film(film, 0.5)
     }
 
     #[test]
@@ -367,11 +351,10 @@ mod tests {
     #[test]
     fn robots_that_cannot_be_built_are_refused() {
         for broken in [
-            Robot { actuators: 0, ..robot(5, 3, Film::None) },
-            Robot { motors_per_actuator: 0, ..robot(5, 3, Film::None) },
-            Robot { damping: Damping::Eta(-1.0), ..robot(5, 3, Film::None) },
-            Robot { positive_gain: f64::INFINITY, ..robot(5, 3, Film::None) },
-            Robot { actuators: 1, motors_per_actuator: 2, ..robot(5, 3, Film::BothEnds) },
+            robot(0, 3, Film::None),
+            robot(5, 0, Film::None),
+            robot(5, 3, Film::None).with_damping_eta(-1.0),
+            robot(1, 2, Film::BothEnds),
         ] {
             assert!(broken.check().is_err(), "{broken:?}");
         }

@@ -119,7 +119,8 @@ impl Dataset {
                 return Err(wrong(&at("id"), format!("id: two runs are called {:?}", entry.id)));
             }
             let file = path.parent().unwrap_or(Path::new("")).join(&entry.file);
-            let run_csv::Rows { times, voltages, channels, remarks } = run_csv::read(&file, &robot, &markers)?;
+            let run_csv::Rows { times, voltages, channels, remarks } =
+                run_csv::read(&file, &robot, nominal.robot.positive_gain.unwrap_or(1.0), &markers)?;
             let run = MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks };
             runs.push(run.checked(&robot)?);
         }

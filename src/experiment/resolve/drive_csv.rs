@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::config::ConfigError;
+use super::super::config::ConfigError;
+use super::drive::Driven;
 use crate::drive::Table;
-use crate::model::Robot;
 
-/// Reads the table for a robot, whose material must bear the voltages. Columns may stand in any order; others are ignored.
+/// Reads the table for a robot whose material must bear the voltages. Columns may stand in any order; others are ignored.
 ///
 /// # Errors
 /// [`ConfigError::Data`] names the file and the line: a missing column, a cell that is no number or too high a voltage, times that do not rise.
-pub fn read(path: &Path, robot: &Robot) -> Result<Table, ConfigError> {
+pub fn read(path: &Path, robot: &Driven) -> Result<Table, ConfigError> {
     let bytes = crate::files::read(path).map_err(|error| ConfigError::Data { path: path.into(), reason: error.to_string() })?;
     parse(&bytes, robot.actuators, |voltage| robot.check_voltage(voltage))
         .map_err(|reason| ConfigError::Data { path: path.into(), reason })
