@@ -21,7 +21,7 @@ use thiserror::Error;
 use crate::model::ModelError;
 
 /// Bullet's limit on the product of two friction coefficients, which the planar engine keeps for equal friction.
-const LARGEST_FRICTION: f64 = 10.0;
+pub(crate) const LARGEST_FRICTION: f64 = 10.0;
 
 /// Gauss points along a body, from −1 to 1, with their weights: exact for the square of a linear speed of one sign.
 const GAUSS: [(f64, f64); 3] = [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];

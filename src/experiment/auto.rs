@@ -1,88 +1,41 @@
-//! `time_step_s = "auto"`: steps that adapt, with a tolerance that is tightened until the result stays.
+//! `time_step_s = "auto"`: adaptive steps with a tolerance that is tightened until the result converges.
 
 use std::fmt::Write as _;
 
-use serde::Serialize;
-
 use super::adaptive::{self, LONGEST, StepCount, Stopped};
 use super::run::{Control, Run};
+use super::step_choice::{Accuracy, StepChoice, StepTrial};
 use super::{EngineKind, Experiment};
 use crate::engine::{Engine, EngineError};
 use crate::model::Mount;
 
-/// The loosest tolerance, as a share of the robot's length for an allowed error of one, the least such share to begin with, and the factor to the next. On the
-/// floor results err with about the square root of the tolerance (measured: 2 to 3 times less with a tenth), so it goes with the square of the error.
+/// The first tolerance as a fraction of the robot's length, per square of the allowed error; its lower limit; and the factor to the next. On the floor errors
+/// go with about the square root of the tolerance, hence the square.
 const LOOSEST: f64 = 0.02;
 const FINEST: f64 = 1e-11;
 const TIGHTER: f64 = 0.1;
-/// By how much less a result changes with the next tolerance at best, as sums of local errors of third order do.
+/// Factor by which the change falls from one tolerance to the next at best: 10^(2/3), for local errors of third order.
 const FALL: f64 = 4.64;
-/// Runs with ever tighter tolerances.
+/// Most runs, with ever tighter tolerances.
 const RUNS: usize = 6;
-/// After the second and the third run it is seen whether the motion is chaotic, if the result changes by more than so many times what is allowed.
+/// After the second and the third run the spread is tested if the result changes by more than these multiples of the allowed error.
 const FAR: [f64; 2] = [5.0, 1.0];
-/// Steps of one run at most: this many, or those of so many per longest step if that is more.
+/// Most steps of one run: this many, or `MOST_STEPS_OF_LONGEST` per longest step if that is more.
 const MOST_STEPS: u64 = 2_000_000;
 const MOST_STEPS_OF_LONGEST: u64 = 500;
-/// By this share all coefficients of friction are changed up and down, which should change a result by nothing that can be seen.
+/// Relative change of all coefficients of friction in the spread test.
 const PERTURBATION: f64 = 2e-6;
 /// Values below this (mm, deg, Hz, –) are zero but for rounding.
 const ZERO: f64 = 1e-6;
 
-/// What a run with adaptive steps is to be exact in.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Accuracy {
-    /// The measure; otherwise the path of all nodes over all records.
-    pub measure: Option<String>,
-    /// Share of it that a ten times tighter tolerance may change.
-    pub error: f64,
-}
-
-/// A run with one tolerance.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StepTrial {
-    /// Largest local error of a step (cm).
-    pub tolerance_cm: f64,
-    /// Steps taken, halves and rejected ones included.
-    pub steps: u64,
-    /// The measure that is compared; absent for `trajectory`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<f64>,
-    /// Relative change from the ten times larger tolerance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub change: Option<f64>,
-    /// Why it gave no result.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub failed: Option<String>,
-}
-
-/// How the steps of a run were chosen.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StepChoice {
-    /// What was compared: a measure's name, or `trajectory` for all nodes over all records.
-    pub measure: String,
-    /// Relative change from a ten times larger tolerance to the run's.
-    pub change: f64,
-    /// The largest that was allowed.
-    pub asked: f64,
-    /// The run's tolerance (cm).
-    pub tolerance_cm: f64,
-    /// The shortest and longest step of the run (s), of impacts apart.
-    pub shortest_step_s: f64,
-    /// See there.
-    pub longest_step_s: f64,
-    /// All runs; the last is the one whose results are given.
-    pub trials: Vec<StepTrial>,
-}
-
-/// What a run gives to compare.
-enum Seen {
+/// A result to compare.
+enum Observed {
     Value(f64),
-    /// Places of the nodes (cm) in all records, and how many numbers a record has.
+    /// Positions of the nodes (cm) in all records, and the numbers per record.
     Path(Vec<f64>, usize),
 }
 
-/// Runs an experiment with ever tighter tolerances until its result changes by less than is allowed.
+/// Runs an experiment with ever tighter tolerances until its result changes by less than allowed.
 pub(super) fn run(
     experiment: &Experiment,
     accuracy: &Accuracy,
@@ -116,7 +69,7 @@ pub(super) fn run(
             return Ok(run);
         }
         let Some(change) = ladder.trials.last().and_then(|trial| trial.change) else { continue };
-        // Two runs that agree after a large change may do so by chance: a third has to.
+        // Two runs that agree after a large change may do so by chance: a third must confirm.
         let before = ladder.trials[level - 1].change;
         if change <= accuracy.error && before.is_none_or(|before| before <= FAR[0] * accuracy.error) {
             return Ok(Run { step_choice: Some(ladder.choice(change, level, count)), ..run });
@@ -140,8 +93,8 @@ struct Ladder<'a> {
     loosest: f64,
     most_steps: u64,
     trials: Vec<StepTrial>,
-    last: Option<Seen>,
-    /// Whether the last run had trouble that leaves no measures.
+    last: Option<Observed>,
+    /// True if the last run had trouble that leaves no measures.
     troubled: bool,
 }
 
@@ -180,22 +133,22 @@ impl<'a> Ladder<'a> {
         self.last = None;
     }
 
-    /// Takes a run's result in.
+    /// Takes a run's result.
     fn take(&mut self, level: usize, run: &Run, count: StepCount, trouble: Option<String>) -> Result<(), EngineError> {
         self.troubled = trouble.is_some();
-        let seen = if trouble.is_some() { None } else { Some(self.seen(run)?) };
-        let change = self.last.as_ref().zip(seen.as_ref()).map(|(before, now)| difference(before, now));
-        let value = if let Some(Seen::Value(value)) = seen { Some(value) } else { None };
+        let observed = if trouble.is_some() { None } else { Some(self.observed(run)?) };
+        let change = self.last.as_ref().zip(observed.as_ref()).map(|(before, now)| difference(before, now));
+        let value = if let Some(Observed::Value(value)) = observed { Some(value) } else { None };
         self.trials.push(StepTrial { tolerance_cm: self.tolerance(level), steps: count.taken, value, change, failed: trouble });
-        self.last = seen;
+        self.last = observed;
         Ok(())
     }
 
-    fn seen(&self, run: &Run) -> Result<Seen, EngineError> {
+    fn observed(&self, run: &Run) -> Result<Observed, EngineError> {
         let Some(name) = self.accuracy.measure.as_deref() else {
-            return Ok(Seen::Path(run.recording.positions.clone(), 3 * run.recording.nodes()));
+            return Ok(Observed::Path(run.recording.positions.clone(), 3 * run.recording.nodes()));
         };
-        run.measures.get(name).map(Seen::Value).ok_or_else(|| {
+        run.measures.get(name).map(Observed::Value).ok_or_else(|| {
             EngineError::NotResolved(format!(
                 "simulation.step_measure: {name} cannot be had from this experiment; take another or a longer run"
             ))
@@ -214,8 +167,7 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// What the measure spreads over when friction is changed by next to nothing, with the tolerance of a run that was made, if that is more than `times` what is
-    /// allowed.
+    /// The measure's spread under tiny changes of friction, at the tolerance of a run already made, in words if it exceeds `times` the allowed error.
     fn spread(&self, experiment: &Experiment, level: usize, times: f64) -> Option<String> {
         let name = self.accuracy.measure.as_deref()?;
         if experiment.robot.mount != Mount::Ground || experiment.engine != EngineKind::Planar {
@@ -262,17 +214,17 @@ impl<'a> Ladder<'a> {
     }
 }
 
-/// Relative difference of what two runs gave.
-fn difference(coarse: &Seen, fine: &Seen) -> f64 {
+/// Relative difference of two results.
+fn difference(coarse: &Observed, fine: &Observed) -> f64 {
     match (coarse, fine) {
-        (Seen::Value(a), Seen::Value(b)) if a.abs().max(b.abs()) < ZERO => 0.0,
-        (Seen::Value(a), Seen::Value(b)) => ((a - b) / b).abs(),
-        (Seen::Path(a, width), Seen::Path(b, _)) => path_change(a, b, *width),
+        (Observed::Value(a), Observed::Value(b)) if a.abs().max(b.abs()) < ZERO => 0.0,
+        (Observed::Value(a), Observed::Value(b)) => ((a - b) / b).abs(),
+        (Observed::Path(a, width), Observed::Path(b, _)) => path_change(a, b, *width),
         _ => f64::INFINITY,
     }
 }
 
-/// Root mean square distance of all nodes in all records, of so many numbers each, relative to that of their travel.
+/// Root mean square distance of all nodes in all records (`width` numbers each), relative to that of their travel.
 fn path_change(coarse: &[f64], fine: &[f64], width: usize) -> f64 {
     let first = &fine[..width];
     let (mut apart, mut travel) = (0.0, 0.0);

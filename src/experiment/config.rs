@@ -70,15 +70,19 @@ impl Fault {
     }
 }
 
-/// An experiment file as written, every key optional. See the crate's guide for what the keys mean.
+/// An experiment file as written, every key optional. The keys' meaning: [`keys::guide`](crate::keys::guide).
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct Config {
+    /// `[material]`.
     pub material: MaterialConfig,
+    /// `[robot]`.
     pub robot: RobotConfig,
+    /// `[drive]`.
     pub drive: DriveConfig,
+    /// `[simulation]`.
     pub simulation: SimulationConfig,
+    /// `[[effect]]` tables.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<EffectConfig>,
 }
@@ -92,9 +96,10 @@ impl Config {
 
 /// One `[[effect]]`: its id and its parameters.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
-#[allow(missing_docs)]
 pub struct EffectConfig {
+    /// Name of the effect.
     pub id: String,
+    /// Values by parameter.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,
 }
@@ -102,84 +107,128 @@ pub struct EffectConfig {
 /// `[material]`: a preset and what overrides it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct MaterialConfig {
+    /// Which published set of constants: parameter-2 matches the published deflection, parameter-4 the published resonance.
     pub preset: Option<String>,
+    /// Length of one actuator (mm).
     pub actuator_length_mm: Option<f64>,
+    /// Width (mm).
     pub width_mm: Option<f64>,
+    /// Gravity, downwards (m/s²).
     pub gravity_m_s2: Option<f64>,
+    /// Young's modulus of the piezo layer (GPa).
     pub piezo_modulus_gpa: Option<f64>,
+    /// Poisson's ratio of the piezo layer.
     pub piezo_poisson: Option<f64>,
+    /// Thickness of the piezo layer (µm).
     pub piezo_thickness_um: Option<f64>,
+    /// Density of the piezo layer (g/cm³).
     pub piezo_density_g_cm3: Option<f64>,
+    /// Piezoelectric charge constant d33 (pm/V).
     pub d33_pm_per_v: Option<f64>,
+    /// Distance between neighbouring electrodes: field = voltage / pitch (mm).
     pub electrode_pitch_mm: Option<f64>,
+    /// Young's modulus of the substrate (GPa).
     pub substrate_modulus_gpa: Option<f64>,
+    /// Poisson's ratio of the substrate.
     pub substrate_poisson: Option<f64>,
+    /// Thickness of the substrate (µm).
     pub substrate_thickness_um: Option<f64>,
+    /// Density of the substrate (g/cm³).
     pub substrate_density_g_cm3: Option<f64>,
+    /// Modulus of the adhesive, already that of plane strain (GPa).
     pub adhesive_modulus_gpa: Option<f64>,
+    /// Thickness of the adhesive; 0 leaves two layers (µm).
     pub adhesive_thickness_um: Option<f64>,
+    /// Density of the adhesive (g/cm³).
     pub adhesive_density_g_cm3: Option<f64>,
+    /// Largest field: voltages above this times electrode_pitch_mm are refused (2000 V over 0.5 mm) (kV/mm).
     pub max_field_kv_mm: Option<f64>,
+    /// Largest strain of the laminate's outer fibre by bending: above it a run warns, above twice it gives no measures.
     pub max_strain: Option<f64>,
 }
 
 /// `[robot]`.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct RobotConfig {
+    /// Number of actuators N.
     pub actuators: Option<usize>,
+    /// Joints per actuator m; the robot has N m joints, at most 10000, and N m + 1 links.
     pub motors_per_actuator: Option<usize>,
+    /// Lying on a floor; left end held, no floor; or neither.
     pub mount: Option<String>,
+    /// Damping of the joints as the reference's dampingEta; either this or damping_time_s.
     pub damping_eta: Option<f64>,
+    /// Damping of the joints as the time η of the torque law: dampingEta = 2π η · 1 Hz (s).
     pub damping_time_s: Option<f64>,
+    /// Thickness of the collision boxes; it sets contact and inertia (mm).
     pub collision_thickness_mm: Option<f64>,
+    /// Factor on positive voltages before the torque law; 1.733 for the voltages applied to the published robot.
     pub positive_gain: Option<f64>,
+    /// Coefficients of friction: [robot.friction].
     pub friction: FrictionConfig,
 }
 
 /// `[robot.friction]`.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct FrictionConfig {
+    /// Coefficient of the floor.
     pub ground: Option<f64>,
+    /// Coefficient of the bare robot.
     pub low: Option<f64>,
+    /// Coefficient of the films.
     pub high: Option<f64>,
+    /// Where films are glued under the robot.
     pub film: Option<String>,
+    /// Length of a film as a share of one actuator.
     pub film_fraction: Option<f64>,
 }
 
 /// `[drive]`: exactly one waveform with the keys that belong to it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct DriveConfig {
+    /// Gait: a named sequence of five actuators; dc: constant; sine: V = amplitude/2 (1 - cos 2πft); step: 0 V, then constant; sequence: phases of constant voltages; csv: a table, linear between rows.
     pub waveform: Option<String>,
+    /// Name of the gait (with waveform gait).
     pub gait: Option<String>,
+    /// Period; either this or frequency_hz (with waveform gait, sequence) (s).
     pub period_s: Option<f64>,
+    /// Frequency (with waveform gait, sine, sequence) (Hz).
     pub frequency_hz: Option<f64>,
+    /// Delay between the parts of gaits that take one; jumper-delay takes negative ones too (with waveform gait) (s).
     pub delay_s: Option<f64>,
+    /// How long the voltage is on, for gaits that take it (with waveform gait) (s).
     pub on_time_s: Option<f64>,
+    /// Voltage of each actuator when it is on; needed by sequences with masks for robots that have not 5 actuators (with waveform gait, sequence) (V).
     pub on_voltages_v: Option<Vec<f64>>,
+    /// Voltage of each actuator (with waveform dc, step) (V).
     pub voltages_v: Option<Vec<f64>>,
+    /// Largest voltage, the same for every actuator (with waveform sine) (V).
     pub amplitude_v: Option<f64>,
+    /// Largest voltage of each actuator (with waveform sine) (V).
     pub amplitudes_v: Option<Vec<f64>>,
+    /// When the step comes; on Bullet not before two time steps, as in the reference (with waveform step) (s).
     pub at_s: Option<f64>,
+    /// The phases in order: phases = [{ until_s = 0.01, on = "01110" }, ...] (with waveform sequence).
     pub phases: Option<Vec<PhaseConfig>>,
+    /// The table: t_s, v1_v, v2_v, ...; its ends are held (with waveform csv).
     pub file: Option<PathBuf>,
 }
 
 /// One phase of a sequence.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct PhaseConfig {
+    /// End as a share of the period.
     pub until: Option<f64>,
+    /// End as a time (s).
     pub until_s: Option<f64>,
+    /// A mask of 0 and 1, one per actuator: those of 1 get their on_voltages_v, the others 0 V.
     pub on: Option<String>,
+    /// Voltage of each actuator (with waveform dc, step) (V).
     pub voltages_v: Option<Vec<f64>>,
 }
 
@@ -190,28 +239,40 @@ pub struct PhaseConfig {
 /// regular record, the state before it: 0 records at whole multiples of the interval; absent, the records are those of the reference, one step earlier.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
-#[allow(missing_docs)]
 pub struct SimulationConfig {
+    /// Bullet: bit for bit the reference; planar: the fast one. In sweeps the default is planar.
     pub engine: Option<String>,
+    /// Flat and at rest; or in equilibrium with gravity, floor and first voltages (planar engine).
     pub start: Option<String>,
+    /// Coefficients of friction: [robot.friction].
     pub friction: Option<String>,
+    /// Weight of a step's end over that of its start, per time step: damps oscillations between steps; less is more accurate without contact (with engine = "planar") (1/s).
     pub numerical_damping_per_s: Option<f64>,
+    /// Time step; "auto": adaptive steps, with tolerances refined until the result changes by less than step_error (s).
     pub time_step_s: Option<StepConfig>,
+    /// Relative change of the result that a ten times tighter tolerance may make (with time_step_s = "auto").
     pub step_error: Option<f64>,
+    /// Name of the measure that sets the tolerance (with time_step_s = "auto").
     pub step_measure: Option<String>,
+    /// Number of steps.
     pub steps: Option<u64>,
+    /// Length of the run (s).
     pub duration_s: Option<f64>,
+    /// Steps from one record to the next; the first and last step are always recorded.
     pub record_every_steps: Option<u64>,
+    /// Time from one record to the next (s).
     pub record_every_s: Option<f64>,
+    /// Step before which the first regular record is taken: 0 records at whole multiples of the interval.
     pub record_from_step: Option<u64>,
 }
 
 /// A time step: seconds, or the word `auto`.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(untagged, expecting = "time_step_s is a number of seconds or \"auto\"")]
-#[allow(missing_docs)]
 pub enum StepConfig {
+    /// A number of seconds.
     Seconds(f64),
+    /// `auto`.
     Word(String),
 }
 

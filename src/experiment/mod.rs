@@ -9,8 +9,8 @@ mod resolve;
 mod run;
 mod spec;
 mod state;
+mod step_choice;
 
-pub use auto::{Accuracy, StepChoice, StepTrial};
 pub(crate) use config::line_of;
 pub use config::{
     Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, Setting,
@@ -21,9 +21,10 @@ pub(crate) use range::{step_too_long, unstable};
 #[cfg(test)]
 pub(crate) use resolve::DEFAULT_STEP_ERROR;
 pub use resolve::{experiment, with_bodies};
-pub use run::{Control, Run, run};
+pub use run::{Control, Run};
 pub(crate) use run::{Supply, hermite, hermite_at};
 pub use state::SavedState;
+pub use step_choice::{Accuracy, StepChoice, StepTrial};
 
 use crate::drive::{Drive, Waveform};
 use crate::effects::{Applied, SignalChain};
@@ -165,5 +166,24 @@ impl Experiment {
                 date_time,
             }),
         }
+    }
+}
+
+/// Runs an experiment on an engine of its robot, from the engine's step on. `observe` is called every 256 steps, more often for more than 64 joints, with the
+/// number of steps done.
+///
+/// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time is step · dt; joints are read
+/// and torques computed; the state before the step is recorded if it is due; the torques are applied and the world steps. An engine whose forces act at the
+/// middle of a step gets the step's mean voltages instead, or those of several parts of the step if it asks for them.
+///
+/// With an [`accuracy`](Experiment::accuracy) the steps adapt, the experiment's time step is the grid of its records, and `observe` sees several runs, with
+/// ever tighter tolerances.
+///
+/// # Errors
+/// [`EngineError`] if the simulation fails; its records are lost.
+pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut(u64) -> Control) -> Result<Run, EngineError> {
+    match &experiment.accuracy {
+        Some(accuracy) => auto::run(experiment, accuracy, engine, observe),
+        None => run::run(experiment, engine, observe),
     }
 }

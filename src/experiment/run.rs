@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
+use super::Experiment;
 use super::range::{self, Bending, CLEARLY};
-use super::{Experiment, StepChoice, auto};
+use super::step_choice::StepChoice;
 use crate::analytic;
 use crate::drive::{Drive, Means, Waveform};
 use crate::effects::View;
@@ -91,23 +92,12 @@ impl Run {
     }
 }
 
-/// Runs an experiment on an engine of its robot, from the engine's step on. `observe` is called every 256 steps, or more often for more than 64 joints, with the number of steps done.
-///
-/// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time
-/// is step · dt; joints are read and torques computed; the state before the step is recorded if its turn has come; the torques are
-/// applied and the world steps. An engine that works at the middle of a step gets the step's mean voltages instead,
-/// or those of several parts of the step if it asks for them. Nothing is allocated inside the loop: the recording has its final size from the start.
-///
-/// With an [`accuracy`](Experiment::accuracy) the steps adapt, the experiment's time step is that of its records only, and `observe` sees several
-/// runs, with ever tighter tolerances.
-///
-/// # Errors
-/// [`EngineError`] if the simulation goes wrong; what was recorded until then is lost.
-pub fn run(experiment: &Experiment, engine: &mut dyn Engine, observe: impl FnMut(u64) -> Control) -> Result<Run, EngineError> {
-    if let Some(accuracy) = &experiment.accuracy {
-        return auto::run(experiment, accuracy, engine, observe);
-    }
-    let mut observe = observe;
+/// [`experiment::run`](super::run) with steps of one length. Nothing is allocated inside the loop: the recording has its final size from the start.
+pub(super) fn run(
+    experiment: &Experiment,
+    engine: &mut dyn Engine,
+    mut observe: impl FnMut(u64) -> Control,
+) -> Result<Run, EngineError> {
     let midpoint = engine.midpoint();
     let start = engine.step();
     let mut done = start;

@@ -3,11 +3,9 @@
 use std::fmt::Write;
 
 use super::{Placed, comment, placed};
+use crate::engine::LARGEST_FRICTION;
 use crate::experiment::Experiment;
 use crate::model::{Mount, Robot};
-
-/// Bullet's limit on the product of two friction coefficients.
-const LARGEST_FRICTION: f64 = 10.0;
 
 /// The robot of an experiment as MJCF: chain, springs, dampers, floor, and one actuator per joint.
 ///

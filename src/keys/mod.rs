@@ -9,6 +9,9 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+#[doc = include_str!("../../docs/keys.md")]
+pub mod guide {}
+
 pub(crate) use render::wrapped;
 pub use render::{facts, json, markdown, text};
 

@@ -4,29 +4,10 @@ use std::path::Path;
 
 use super::super::config::{ConfigError, DriveConfig, Fault, PhaseConfig};
 use super::drive_csv;
+use super::driven::Driven;
 use crate::drive::Waveform;
 use crate::drive::gait::{self, Parameter};
-use crate::model::Robot;
 use crate::words::{not_one_of, number};
-
-/// What a drive must fit.
-pub(super) struct Driven<'a> {
-    robot: &'a Robot,
-    pub actuators: usize,
-    positive_gain: f64,
-}
-
-impl<'a> Driven<'a> {
-    /// A robot whose positive voltages are multiplied by `positive_gain` (–).
-    pub fn new(robot: &'a Robot, positive_gain: f64) -> Self {
-        Self { robot, actuators: robot.actuators, positive_gain }
-    }
-
-    /// Checks that the material bears a voltage (V).
-    pub fn check_voltage(&self, voltage: f64) -> Result<(), String> {
-        self.robot.check_voltage(voltage, self.positive_gain)
-    }
-}
 
 /// The keys of `[drive]` that are present, for finding those that do not belong to the waveform.
 fn present(d: &DriveConfig) -> Vec<&'static str> {

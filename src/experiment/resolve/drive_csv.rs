@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::super::config::ConfigError;
-use super::drive::Driven;
+use super::driven::Driven;
 use crate::drive::Table;
 
 /// Reads the table for a robot whose material must bear the voltages. Columns may stand in any order; others are ignored.

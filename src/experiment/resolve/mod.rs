@@ -2,6 +2,7 @@
 
 mod drive;
 mod drive_csv;
+mod driven;
 mod steps;
 
 #[cfg(test)]
@@ -9,7 +10,7 @@ pub(crate) use steps::DEFAULT_STEP_ERROR;
 
 use std::path::Path;
 
-use self::drive::Driven;
+use self::driven::Driven;
 use self::steps::Steps;
 use super::config::{Config, ConfigError, EffectConfig, Fault, Source};
 use super::{EngineKind, Experiment, Start};
