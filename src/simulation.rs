@@ -11,7 +11,7 @@ use crate::experiment::{Config, Experiment, SavedState, Supply};
 pub use crate::experiment::{EngineKind, Start};
 use crate::model::Robot;
 
-/// Most steps of a run: up to here times are whole multiples of the step to a part in ten.
+/// Most steps: beyond, times are no longer distinct multiples of the step in double precision.
 const MAX_STEPS: f64 = 1e15;
 
 /// How a robot is simulated.

@@ -51,7 +51,7 @@ bool Solver::read_chains(btPersistentManifold **manifolds, int manifold_count, c
 void Solver::convertContacts(btPersistentManifold **manifolds, int manifold_count, const btContactSolverInfo &info) {
   if (!read_chains(manifolds, manifold_count, info)) return btMultiBodyConstraintSolver::convertContacts(manifolds, manifold_count, info);
   for (int i = 0; i < manifold_count; ++i) convert(*manifolds[i], info);
-  // Without contacts, the constraints are left.
+  // With no contacts left, this converts the joint constraints only.
   btMultiBodyConstraintSolver::convertContacts(nullptr, 0, info);
 }
 
@@ -123,7 +123,7 @@ void Solver::convert(btPersistentManifold &manifold, const btContactSolverInfo &
   const int first_a = respond(a, rows_a, count);
   for (int i = 0; i < count; ++i) rows_b[i].velocity = rows_a[i].velocity;
   const int first_b = respond(b, rows_b, count);
-  // The second body's rows may have moved the first one's.
+  // respond(b) may have reallocated the storage of a's rows, so they are addressed by index.
   const int freedoms_a = a.body->getNumDofs() + 6, freedoms_b = b.body->getNumDofs() + 6;
   for (int i = 0; i < count; ++i) {
     const bool is_friction = i % PER_CONTACT != 0;

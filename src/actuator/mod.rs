@@ -8,8 +8,9 @@
 ///
 /// Frame: the joint axis is +y, x runs along the chain, z is up; a positive θ lowers the far end.
 ///
-/// Valid below 1000 ppm strain. Not modelled: hysteresis, creep, stiffness that depends on amplitude. The law is evaluated at the
-/// start of a step, so a step must stay below [`stable_step`](crate::analytic::stable_step).
+/// Valid below 1000 ppm strain. Not modelled: hysteresis, creep, stiffness that depends on amplitude. On Bullet the law is
+/// evaluated at the start of a step, so a step must stay below [`stable_step`](crate::analytic::stable_step). The planar engine takes stiffness, rest angle and
+/// damping time from here into its implicit step.
 ///
 /// # Examples
 /// ```

@@ -100,7 +100,7 @@ impl BulletEngine {
                 world.add_ground(&Ground {
                     half_extents: GROUND_HALF_EXTENTS,
                     top: -0.5 * robot.collision_thickness,
-                    // Bullet takes products: one that is set every step stands on the robot alone, and so does restitution.
+                    // Bullet multiplies the coefficients of both bodies. Where the robot's is set in every step, the floor's is 1; so is its restitution.
                     friction: if sliding.is_some() { 1.0 } else { robot.friction.ground },
                     restitution: 1.0,
                     collision_margin: COLLISION_MARGIN,

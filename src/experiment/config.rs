@@ -445,18 +445,24 @@ fn assign(table: &mut Table, key: &str, value: toml::Value) -> Result<(), String
     }
 }
 
-/// Line (from 1) of the deepest part of a key that the text contains.
+/// Line (from 1) of the deepest part of a key that the text contains. A part that is a number is an index into an array.
 pub(crate) fn line_of<'a>(text: &str, key: impl IntoIterator<Item = &'a str>) -> Option<usize> {
     let parsed = DeTable::parse(text).ok()?;
-    let mut table = parsed.get_ref();
-    let mut found = None;
+    let (mut at, mut found): (Option<&DeValue>, _) = (None, None);
     for part in key {
-        let Some((name, value)) = table.iter().find(|(name, _)| name.get_ref().as_ref() == part) else { break };
-        found = Some(name.span().start);
-        match value.get_ref() {
-            DeValue::Table(inner) => table = inner,
-            _ => break,
-        }
+        let table = match at {
+            None => Some(parsed.get_ref()),
+            Some(DeValue::Table(table)) => Some(table),
+            Some(DeValue::Array(array)) => {
+                let Some(item) = part.parse().ok().and_then(|index: usize| array.get(index)) else { break };
+                (found, at) = (Some(item.span().start), Some(item.get_ref()));
+                continue;
+            }
+            Some(_) => None,
+        };
+        let next = table.and_then(|table| table.iter().find(|(name, _)| name.get_ref().as_ref() == part));
+        let Some((name, value)) = next else { break };
+        (found, at) = (Some(name.span().start), Some(value.get_ref()));
     }
     found.map(|offset| text[..offset].matches('\n').count() + 1)
 }

@@ -3,25 +3,16 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use toml::de::{DeTable, DeValue};
-
 use super::super::observations::ObservationError;
 use super::super::{observations, robot, run_csv, voltage};
 use super::{DataError, Dataset, Description, MOST_STEPS, Marker, MeasuredRun};
 use crate::analytic;
-use crate::experiment::{Config, ConfigError, DriveConfig, SimulationConfig, Source, StepConfig, experiment, presets};
+use crate::experiment::{self, Config, ConfigError, DriveConfig, SimulationConfig, Source, StepConfig, presets};
 use crate::model::{Mount, Robot};
 use crate::words;
 
 /// Range of a standard deviation (mm).
 const NOISE_MM: RangeInclusive<f64> = 1e-9..=1e5;
-
-/// A part of a key in a description.
-#[derive(Debug, Clone, Copy)]
-enum Part<'a> {
-    Key(&'a str),
-    Index(usize),
-}
 
 impl Dataset {
     /// Reads a description (a file, the folder of a `dataset.toml`, or `preset:NAME`) and its runs.
@@ -42,12 +33,12 @@ impl Dataset {
             message: words::toml_error(&error),
         })?;
         let wrong =
-            |key: &[Part], reason: String| DataError::Content { path: path.into(), line: line_of(&text, key), column: 0, reason };
+            |key: &[&str], reason: String| DataError::Content { path: path.into(), line: line_of(&text, key), column: 0, reason };
         if let (false, [_, ..]) = (description.run.is_empty(), &description.observation[..]) {
             return Err(value_error(
                 path,
                 &text,
-                &[Part::Key("observation"), Part::Index(0)],
+                &["observation", "0"],
                 "observation",
                 "stands beside [[run]]: a data set has runs or single numbers; describe the numbers in a file of their own",
             ));
@@ -68,16 +59,16 @@ impl Dataset {
         let robot = resolved_robot(path, &text, &nominal)?;
         let length = robot.material.actuator_length * robot.actuators as f64;
         if description.run.is_empty() && description.observation.is_empty() {
-            return Err(wrong(&[Part::Key("dataset")], "there are no runs: add [[run]] tables with id and file".into()));
+            return Err(wrong(&["dataset"], "there are no runs: add [[run]] tables with id and file".into()));
         }
         if description.markers.is_empty() && !description.run.is_empty() {
-            return Err(wrong(&[Part::Key("markers")], "there are no markers: add [markers] with name = distance in mm".into()));
+            return Err(wrong(&["markers"], "there are no markers: add [markers] with name = distance in mm".into()));
         }
         let mut markers = Vec::new();
         for (name, position) in &description.markers {
             if !(0.0..=10.0 * length + 1e-9).contains(position) {
                 return Err(wrong(
-                    &[Part::Key("markers"), Part::Key(name)],
+                    &["markers", name],
                     format!(
                         "marker {name} is at {} mm, but the robot is {} mm long",
                         words::number(*position),
@@ -95,14 +86,14 @@ impl Dataset {
                 let known: Vec<_> = markers.iter().map(|marker| format!("{}_mm", marker.name)).collect();
                 let hint = words::did_you_mean(key, known.iter().map(String::as_str).chain(["default_mm"]));
                 return Err(wrong(
-                    &[Part::Key("noise"), Part::Key(key)],
+                    &["noise", key],
                     format!("{key} is neither default_mm nor the name of a marker with _mm{hint}"),
                 ));
             }
             if !NOISE_MM.contains(value) {
                 let [value, low, high] = [value, NOISE_MM.start(), NOISE_MM.end()].map(|x| words::number(*x));
                 let reason = format!("{key} is {value}, but must be positive: between {low} and {high}");
-                return Err(wrong(&[Part::Key("noise"), Part::Key(key)], reason));
+                return Err(wrong(&["noise", key], reason));
             }
         }
         for marker in &markers {
@@ -111,7 +102,8 @@ impl Dataset {
         }
         let mut runs: Vec<MeasuredRun> = Vec::new();
         for (index, entry) in description.run.iter().enumerate() {
-            let at = |key: &'static str| [Part::Key("run"), Part::Index(index), Part::Key(key)];
+            let number = index.to_string();
+            let at = |key: &'static str| ["run", &number, key];
             if entry.id.trim().is_empty() {
                 return Err(wrong(&at("id"), "id is empty; every run needs a name".into()));
             }
@@ -131,8 +123,8 @@ impl Dataset {
             }
             observations::check(&nominal, observation).map_err(|error| match error {
                 ObservationError::Value { key, message } => {
-                    let parts: Vec<Part> =
-                        [Part::Key("observation"), Part::Index(index)].into_iter().chain(key.split('.').map(Part::Key)).collect();
+                    let number = index.to_string();
+                    let parts: Vec<&str> = ["observation", &number].into_iter().chain(key.split('.')).collect();
                     value_error(path, &text, &parts, &format!("observation {}: {key}", index + 1), message)
                 }
                 ObservationError::Other(error) => error.into(),
@@ -175,31 +167,13 @@ impl MeasuredRun {
     }
 }
 
-/// Line (from 1) of the deepest part of a key that the text contains.
-fn line_of(text: &str, key: &[Part]) -> u64 {
-    let Ok(parsed) = DeTable::parse(text) else { return 1 };
-    let mut at: Option<&DeValue> = None;
-    let mut offset = 0;
-    let first = parsed.get_ref();
-    for part in key {
-        let next = match (part, at) {
-            (Part::Key(own), None) => first.iter().find(|(name, _)| name.get_ref().as_ref() == *own),
-            (Part::Key(own), Some(DeValue::Table(table))) => table.iter().find(|(name, _)| name.get_ref().as_ref() == *own),
-            (Part::Index(index), Some(DeValue::Array(array))) => {
-                let Some(item) = array.get(*index) else { break };
-                (offset, at) = (item.span().start, Some(item.get_ref()));
-                continue;
-            }
-            _ => None,
-        };
-        let Some((name, value)) = next else { break };
-        (offset, at) = (name.span().start, Some(value.get_ref()));
-    }
-    text[..offset].matches('\n').count() as u64 + 1
+/// Line (from 1) of the deepest part of a key that the text contains; 1 without any.
+fn line_of(text: &str, key: &[&str]) -> u64 {
+    experiment::line_of(text, key.iter().copied()).map_or(1, |line| line as u64)
 }
 
 /// A wrong value of a description: a usage error.
-fn value_error(path: &Path, text: &str, parts: &[Part], key: &str, message: impl Into<String>) -> DataError {
+fn value_error(path: &Path, text: &str, parts: &[&str], key: &str, message: impl Into<String>) -> DataError {
     let place = format!("{}, line {}", path.display(), line_of(text, parts));
     ConfigError::Value { place, key: key.into(), message: message.into() }.into()
 }
@@ -212,14 +186,16 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
     config.drive.voltages_v = Some(vec![0.0; actuators.min(10_000)]);
     let shown = toml::to_string(&config)
         .map_err(|error| ConfigError::Syntax { source_name: path.display().to_string(), message: error.to_string() })?;
-    experiment(&Source::from_text(path.display().to_string(), shown)).map(|experiment| experiment.robot).map_err(|error| {
-        match error {
-            // Lines of the description, not of the experiment made from it.
-            ConfigError::Value { key, message, .. } => {
-                let parts: Vec<Part> = key.split('.').map(Part::Key).collect();
-                ConfigError::Value { place: format!("{}, line {}", path.display(), line_of(text, &parts)), key, message }
+    experiment::experiment(&Source::from_text(path.display().to_string(), shown)).map(|experiment| experiment.robot).map_err(
+        |error| {
+            match error {
+                // Lines of the description, not of the experiment made from it.
+                ConfigError::Value { key, message, .. } => {
+                    let parts: Vec<&str> = key.split('.').collect();
+                    ConfigError::Value { place: format!("{}, line {}", path.display(), line_of(text, &parts)), key, message }
+                }
+                other => other,
             }
-            other => other,
-        }
-    })
+        },
+    )
 }

@@ -1,10 +1,13 @@
 //! Contact points, two in lanes: the bottom corners of the boxes, the law of contact, and its linear pieces, which the contact modes select.
 //!
-//! Per corner, with the cone K = {|x| ≤ μ z}, compliance R, velocity w and target w*:
+//! Per corner, with compliance R, velocity w, target w* and p = (w* − w)/R:
 //!
 //! ```text
-//! λ = P_K((w* − w)/R)         the gradient of  −R/2 |λ|²  in w: convex, with four linear pieces
+//! Coulomb:   λ_n = max(p_n, 0),  λ_t = p_t limited to |λ_t| ≤ μ λ_n
+//! convex:    λ = projection of p onto the cone |λ_t| ≤ μ λ_n
 //! ```
+//!
+//! Both are piecewise linear with four pieces. The convex law is −1 times the gradient of the convex function R/2 |λ(w)|²; Coulomb's has no potential.
 
 use wide::f64x2;
 
@@ -91,7 +94,7 @@ impl FrictionCone {
     }
 }
 
-/// The bottom corners of a tree level's two bodies, at their reference points or at their far ends.
+/// The bottom corners of a tree level's two bodies: those at the bodies' reference points (the proximal ends), or those at the far ends.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Corners {
     /// From the bodies' reference points (cm).
@@ -378,8 +381,8 @@ impl Corners {
 
     /// Prepares a line search from the iterate to `mean`. After [`agrees`](Self::agrees) for the same `mean`.
     ///
-    /// For corners whose mode changes: the impulse along the search direction at its end on the iterate's pieces, and by how much it fell. The others are
-    /// on the same pieces at both ends, and therefore in between, for the pieces are convex.
+    /// Returns, for corners whose mode changes: the impulse along the search direction at the search's end, if the corners kept the iterate's modes, and by how
+    /// much it fell since its start. Other corners stay on one linear piece, for the pieces are convex.
     #[inline(always)]
     pub(super) fn aim(&mut self, mean: &Spatials, law: &ContactLaw) -> Option<[f64; 2]> {
         let to = self.velocity_in(mean);

@@ -86,7 +86,7 @@ impl Floor {
         }
     }
 
-    /// The contact-detection pass. The root's reference point is at `height` (cm) over the floor as the centre line sees it, with the velocity (cm/s) and
+    /// The contact-detection pass. The root's reference point is at `height` (cm) above that of a flat robot on the floor, with the velocity (cm/s) and
     /// acceleration at constant rates (cm/s²) in `root`.
     #[inline(always)]
     pub(super) fn find(&mut self, quads: &[Quad], levels: usize, height: f64, root: [[f64; 2]; 2], law: &ContactLaw) {

@@ -25,7 +25,8 @@ const SHORTEST_IMPACT: f64 = 1e-10;
 const LONGEST_IMPACT: f64 = 1e-6;
 /// Impacts in one step, after which it is cut no more.
 const MOST_IMPACTS: u32 = 32;
-/// Look-ahead of fast corners per square of the step (1/s): ω² r / (2 v) at landings of the paper's robots.
+/// Look-ahead of fast corners per square of the step (1/s). A corner at radius r of a body that turns at ω falls below its tangent by ω² r h²/2 in a step h; at
+/// vertical velocity v that is a time of ω² r h²/(2 v), with up to 100 /s for ω² r/(2 v) in the robots' landings.
 const ARC: f64 = 100.0;
 /// A step is cut this fraction of the impact's longest part before the predicted landing, which comes a little earlier or later.
 const BEFORE: f64 = 0.8;

@@ -31,12 +31,14 @@ const SLOW: f64 = 0.01;
 /// Largest push-out rate (1/s), where steps differ in length.
 const FASTEST_PUSH_OUT: f64 = 1e3;
 
-/// Look-ahead (s): how long after a step no corner may pass the floor. Of corners slower than [`ContactLaw::landing_speed`], of faster ones, and of faster
-/// ones that land within [`ContactLaw::at_once`].
+/// Look-ahead (s): how long after a step no corner may pass the floor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ahead {
+    /// For corners slower than [`ContactLaw::landing_speed`].
     pub(super) slow: f64,
+    /// For faster corners.
     pub(super) fast: f64,
+    /// For faster corners that land within [`ContactLaw::at_once`].
     pub(super) landing: f64,
 }
 
@@ -53,11 +55,11 @@ pub(super) struct ContactLaw {
     time_step: f64,
     /// Steps per second.
     per_step: f64,
-    /// One over the look-ahead counted from the middle of the step (1/s): of slow corners,
+    /// One over [`Ahead::slow`], counted from the middle of the step (1/s).
     per_ahead: f64,
-    /// of fast ones,
+    /// One over [`Ahead::fast`], counted from the middle of the step (1/s).
     per_ahead_fast: f64,
-    /// and of fast ones that are about to land.
+    /// One over [`Ahead::landing`], counted from the middle of the step (1/s).
     per_ahead_landing: f64,
     /// Fraction of a penetration that is pushed out per second.
     pub(super) push_out: f64,

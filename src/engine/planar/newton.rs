@@ -129,9 +129,9 @@ impl PlanarEngine {
             }
             self.accept(&whole, &among);
             let mut end = self.blocks_with_changed_modes.len();
-            while let Some(last) = self.blocks_with_changed_modes[..end].iter().rposition(|asks| *asks) {
-                // With the next block further in, if there is one.
-                end = self.blocks_with_changed_modes[..last].iter().rposition(|asks| !*asks).unwrap_or(0);
+            while let Some(last) = self.blocks_with_changed_modes[..end].iter().rposition(|changed| *changed) {
+                // A cluster of changed blocks, with its proximal neighbour.
+                end = self.blocks_with_changed_modes[..last].iter().rposition(|changed| !*changed).unwrap_or(0);
                 let part = BLOCK * end..self.levels.min(BLOCK * (last + 1));
                 let among = self.floor.among(&part);
                 steps += self.newton_steps(simd, part, among, STEPS_IN_PART, law).0;
@@ -157,7 +157,7 @@ impl PlanarEngine {
     /// Solves for the present contact modes.
     #[inline(always)]
     pub(super) fn solve_with_modes(&mut self, levels: &Range<usize>, among: &Range<usize>, law: &ContactLaw) -> Articulated {
-        // Distal articulated inertias that are kept must be of the same kind, symmetric or not.
+        // Distal articulated inertias stored from other solves may be unsymmetric, so parts are always solved as such under Coulomb's law.
         let skew = law.friction == FrictionModel::Coulomb && (!self.distal.is_empty() || self.floor.slides());
         let floor = self.floor.tip_to_base(among, law);
         if skew {

@@ -29,7 +29,7 @@ use super::contact::{Corners, OPEN, PUSHED_FORWARD, STICKS};
 use super::lanes::fma;
 use super::law::ContactLaw;
 
-/// Mode changes per place with candidates after which a path is given up; up to 11 were needed.
+/// Mode changes per pair of candidates after which a path is given up; up to 11 were needed.
 const MOST_CHANGES: usize = 16;
 /// Excess velocity (cm/s), above the floor or beside the border to sticking, at which a corner begins that is not in its mode's cone.
 const OFF_THE_BORDER: f64 = 1.0;
