@@ -92,7 +92,7 @@ fn a_recording_in_csv_is_drawn_and_played_as_the_same_one_in_npz() {
     fs::remove_file(bench.path("a.csv.manifest.json")).unwrap();
     let output = bench.sfers(&["animate", "a.csv", "--out", "c.html"]);
     let text = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && text.contains("a.csv.manifest.json is not there"), "{text}");
+    assert!(output.status.success() && text.contains("a.csv.manifest.json is missing"), "{text}");
     let table = fs::read_to_string(bench.path("a.csv")).unwrap();
     fs::write(bench.path("a.csv"), table.replacen("node3_x_mm", "node3_x_cm", 1)).unwrap();
     bench.refuses(&["plot", "a.csv", "--out", "b.svg"], 3, "node3_x_mm");
