@@ -228,7 +228,7 @@ impl Plant for RobotPlant {
         &self.candidates
     }
 
-    /// Joints per actuator: the nominal number, then the larger ones of [`JOINTS`].
+    /// Joints per actuator: the nominal number, then the larger ones of `JOINTS`.
     fn resolutions(&self) -> Vec<f64> {
         let nominal = self.robot.motors_per_actuator;
         let most = if self.robot.mount == Mount::Ground { JOINTS_ON_THE_FLOOR } else { usize::MAX };
