@@ -7,12 +7,9 @@ use thiserror::Error;
 use crate::drive::{Drive, DriveError};
 pub use crate::engine::FrictionModel;
 use crate::engine::{Contact, Engine, EngineError, JointState};
-use crate::experiment::{Config, Experiment, SavedState, Supply};
+use crate::experiment::{Config, Experiment, MAX_STEPS, SavedState, Supply};
 pub use crate::experiment::{EngineKind, Start};
 use crate::model::Robot;
-
-/// Most steps: beyond, times are no longer distinct multiples of the step in double precision.
-const MAX_STEPS: f64 = 1e15;
 
 /// How a robot is simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,7 +84,8 @@ pub struct Node {
 
 /// A robot with its drive, between two time steps.
 ///
-/// The same robot, drive, engine and time step give the bits of [`experiment::run`](crate::experiment::run).
+/// The same robot, drive, engine and time step give the bits of [`experiment::run`](crate::experiment::run). On Bullet an experiment file delays a step of
+/// voltage to the third time step at least, as the reference does; [`Waveform::Step`](crate::drive::Waveform::Step) is taken as it is.
 ///
 /// # Examples
 /// ```
@@ -165,7 +163,7 @@ impl Simulation {
         })
     }
 
-    /// The robot of an experiment, with its effects; the experiment's length and records do not matter.
+    /// The robot of an experiment, with its effects. Its records do not matter, nor does its length, except that `creep` has relaxation times up to it.
     ///
     /// # Errors
     /// As [`new`](Self::new); [`SimulationError::Options`] for an experiment whose steps adapt.

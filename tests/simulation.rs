@@ -261,3 +261,14 @@ fn times_and_voltages_that_cannot_be_are_refused_and_change_nothing() {
     }
     assert_eq!(bits(&state(&mut simulation)), bits(&before));
 }
+
+#[test]
+fn an_experiment_whose_drive_is_of_another_robot_is_an_error_on_both_engines() {
+    for engine in ["bullet", "planar"] {
+        for drive in [Drive::dc([0.0]), Drive::sine([1.0; 6], 14.0)] {
+            let given = if let Waveform::Dc(_) = drive.waveform { 1 } else { 6 };
+            let error = Experiment { drive, ..jump(engine) }.engine().err();
+            assert_eq!(error, Some(EngineError::Voltages { given, needed: 5 }), "{engine}");
+        }
+    }
+}

@@ -26,11 +26,14 @@ pub(crate) use run::{Supply, hermite, hermite_at};
 pub use state::SavedState;
 pub use step_choice::{Accuracy, StepChoice, StepTrial};
 
-use crate::drive::{Drive, Waveform};
+use crate::drive::{Drive, DriveError, Waveform};
 use crate::effects::{Applied, SignalChain};
 use crate::engine::{AffectedEngine, Engine, EngineError, FrictionModel, PlanarEngine};
 use crate::model::{Mount, Robot};
 use crate::recording::{GroundMeta, Meta, definitions};
+
+/// Most steps of a run: up to here rounding of a time is an eighth of a step at most.
+pub(crate) const MAX_STEPS: f64 = 1e15;
 
 /// A checked experiment in CGS units.
 ///
@@ -56,7 +59,7 @@ pub struct Experiment {
     pub accuracy: Option<Accuracy>,
     /// Number of steps.
     pub steps: u64,
-    /// A record is taken every so many steps, and at the first and last.
+    /// Number of steps from one record to the next; the first and last step are recorded as well.
     pub record_every: u64,
     /// The step before which the first regular record is taken.
     pub record_from: u64,
@@ -93,12 +96,15 @@ pub enum Start {
 }
 
 impl Experiment {
-    /// Builds the engine that the experiment asks for.
+    /// Builds the experiment's engine.
     ///
     /// # Errors
-    /// [`EngineError`] if the robot cannot be built; [`EngineError::NoBullet`] for Bullet in a build without it.
+    /// [`EngineError`] if the robot cannot be built; [`EngineError::Voltages`] for a drive of another number of actuators; [`EngineError::NoBullet`] for Bullet in a build without it.
     pub fn engine(&self) -> Result<Box<dyn Engine>, EngineError> {
         let mut chain = SignalChain::new(&self.effects, self.robot.actuators, self.steps as f64 * self.time_step);
+        if let Err(DriveError::Count { given, needed }) = self.drive.check(&self.robot) {
+            return Err(EngineError::Voltages { given, needed });
+        }
         let mut voltages = vec![0.0; self.robot.actuators];
         self.drive.voltages(0.0, &mut voltages);
         chain.settle(&mut voltages);
@@ -174,7 +180,7 @@ impl Experiment {
 ///
 /// One step, in the reference's order: the voltages are those of the *previous* step's time (0 for the first two steps); the time is step · dt; joints are read
 /// and torques computed; the state before the step is recorded if it is due; the torques are applied and the world steps. An engine whose forces act at the
-/// middle of a step gets the step's mean voltages instead, or those of several parts of the step if it asks for them.
+/// middle of a step gets the step's mean voltages instead, or those of several parts of the step according to [`Engine::parts`].
 ///
 /// With an [`accuracy`](Experiment::accuracy) the steps adapt, the experiment's time step is the grid of its records, and `observe` sees several runs, with
 /// ever tighter tolerances.

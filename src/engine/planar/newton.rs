@@ -32,7 +32,7 @@ const STEPS_IN_PART: u32 = 30;
 const DONE_OF_GRAVITY: f64 = 1e-12;
 const DONE_OF_KINETIC: f64 = 1e-18;
 
-/// Under Coulomb's law, which has no cost to lower, Newton's method may cycle. After so many steps a path is followed instead ([`path`](super::path)).
+/// Under Coulomb's law, which has no cost to lower, Newton's method may cycle. After this many steps a path is followed instead ([`path`](super::path)).
 const BEFORE_PATH: u32 = 2;
 /// How often contact is made more compliant in an instant that is not solved.
 const SOFTENINGS: u32 = 2;

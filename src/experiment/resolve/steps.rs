@@ -2,7 +2,7 @@
 
 use super::super::adaptive::LONGEST;
 use super::super::config::{Fault, SimulationConfig, StepConfig};
-use super::super::{Accuracy, EngineKind};
+use super::super::{Accuracy, EngineKind, MAX_STEPS};
 use crate::engine::FrictionModel;
 use crate::model::{Mount, Robot};
 use crate::recording::{MAX_VALUES, definitions};
@@ -12,8 +12,6 @@ use crate::words::{not_one_of, number};
 pub(crate) const DEFAULT_STEP_ERROR: f64 = 1e-3;
 /// Times of records of adaptive runs are multiples of this (s) or less.
 const GRID: f64 = 1e-4;
-/// Most steps of a run: up to here times are whole multiples of the step to a part in ten.
-const MAX_STEPS: f64 = 1e15;
 /// Time steps (s) of which `MAX_STEPS` have distinct times.
 const MIN_TIME_STEP: f64 = 1e-12;
 const MAX_TIME_STEP: f64 = 1e3;
