@@ -27,12 +27,17 @@
 //! ```
 
 mod body;
+mod check;
 mod error;
 mod library;
+mod raw;
 mod settings;
+mod snapshot;
+mod state;
 mod world;
 
 pub use body::{BaseState, BodyId, BoxLink, Contact, Ground, LinkState, VelocityClamp, Wrench};
 pub use error::BulletError;
 pub use settings::SolverSettings;
-pub use world::{Snapshot, World};
+pub use snapshot::Snapshot;
+pub use world::World;

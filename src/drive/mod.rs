@@ -10,7 +10,7 @@ mod table;
 pub use check::DriveError;
 pub(crate) use check::check_positive_gain;
 pub use gait::Gait;
-pub use table::Table;
+pub use table::{Table, TableError};
 
 use std::borrow::Cow;
 use std::f64::consts::PI;

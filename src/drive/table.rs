@@ -1,5 +1,29 @@
 //! A voltage table: straight lines between rows, held at both ends.
 
+use thiserror::Error;
+
+/// Rows that make no [`Table`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// No rows, or no actuators.
+    #[error("the table has no voltages")]
+    Empty,
+    /// Not one voltage per actuator and row.
+    #[error("{voltages} voltages for {rows} rows of {actuators} actuators")]
+    Length {
+        /// How many voltages there are.
+        voltages: usize,
+        /// How many times.
+        rows: usize,
+        /// Voltages per row.
+        actuators: usize,
+    },
+    /// A time that does not rise, or a value that is not finite.
+    #[error("row {0} (counting from 0): times must rise from row to row, and all values must be finite")]
+    Row(usize),
+}
+
 /// Voltages of all actuators at given times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
@@ -15,13 +39,18 @@ impl Table {
     /// A table of `times.len()` rows of `actuators` voltages (V) each. Times (s) must rise strictly.
     ///
     /// # Errors
-    /// The index of the first row whose time does not rise, or whose values are not all finite.
-    pub fn new(times: Vec<f64>, voltages: Vec<f64>, actuators: usize) -> Result<Self, usize> {
-        assert_eq!(times.len() * actuators, voltages.len(), "one voltage per actuator and row");
-        for (row, (time, values)) in times.iter().zip(voltages.chunks_exact(actuators.max(1))).enumerate() {
+    /// [`TableError`] unless there is a row, each with one voltage per actuator, times rise and all values are finite.
+    pub fn new(times: Vec<f64>, voltages: Vec<f64>, actuators: usize) -> Result<Self, TableError> {
+        if times.is_empty() || actuators == 0 {
+            return Err(TableError::Empty);
+        }
+        if times.len().checked_mul(actuators) != Some(voltages.len()) {
+            return Err(TableError::Length { voltages: voltages.len(), rows: times.len(), actuators });
+        }
+        for (row, (time, values)) in times.iter().zip(voltages.chunks_exact(actuators)).enumerate() {
             let rises = row == 0 || times[row - 1] < *time;
             if !rises || !time.is_finite() || values.iter().any(|v| !v.is_finite()) {
-                return Err(row);
+                return Err(TableError::Row(row));
             }
         }
         let mut integrals = vec![0.0; voltages.len()];
@@ -114,8 +143,16 @@ mod tests {
 
     #[test]
     fn rows_out_of_order_or_not_finite_are_refused_by_number() {
-        assert_eq!(Table::new(vec![0.0, 0.0], vec![1.0, 2.0], 1), Err(1));
-        assert_eq!(Table::new(vec![0.0, f64::NAN], vec![1.0, 2.0], 1), Err(1));
-        assert_eq!(Table::new(vec![0.0, 1.0], vec![f64::INFINITY, 2.0], 1), Err(0));
+        assert_eq!(Table::new(vec![0.0, 0.0], vec![1.0, 2.0], 1), Err(TableError::Row(1)));
+        assert_eq!(Table::new(vec![0.0, f64::NAN], vec![1.0, 2.0], 1), Err(TableError::Row(1)));
+        assert_eq!(Table::new(vec![0.0, 1.0], vec![f64::INFINITY, 2.0], 1), Err(TableError::Row(0)));
+    }
+
+    #[test]
+    fn tables_without_rows_or_of_wrong_length_are_refused() {
+        assert_eq!(Table::new(Vec::new(), Vec::new(), 1), Err(TableError::Empty));
+        assert_eq!(Table::new(vec![0.0], Vec::new(), 0), Err(TableError::Empty));
+        let error = Table::new(vec![0.0, 1.0], vec![1.0, 2.0, 3.0], 2).unwrap_err();
+        assert_eq!(error.to_string(), "3 voltages for 2 rows of 2 actuators");
     }
 }

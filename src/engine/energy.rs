@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::{Contact, EnergyTerms, Engine, EngineError, JointState};
 use crate::actuator::PiezoJoint;
-use crate::model::Robot;
+use crate::model::{Robot, box_inertia};
 
 /// Steps between audit samples of the state functions, of an explicit engine and of one that works at the middle of steps.
 /// Work is summed in every step.
@@ -140,7 +140,7 @@ impl EnergyAudit {
         let bodies: Vec<Body> = robot
             .segments()
             .iter()
-            .map(|s| Body { length: s.length, mass: s.mass, inertia: s.mass / 12.0 * (s.length.powi(2) + thickness.powi(2)) })
+            .map(|s| Body { length: s.length, mass: s.mass, inertia: box_inertia(s.mass, s.length, thickness) })
             .collect();
         let count = bodies.len();
         Self {

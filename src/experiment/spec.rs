@@ -6,7 +6,7 @@ use super::{EngineKind, Experiment, Start};
 use crate::drive::Waveform;
 use crate::effects::Applied;
 use crate::engine::FrictionModel;
-use crate::model::{Damping, Film, Mount};
+use crate::model::{Damping, Film};
 
 impl Experiment {
     /// Everything that decides the result, in CGS units and with no defaults left open.
@@ -31,7 +31,7 @@ impl Experiment {
             },
             "actuators": self.robot.actuators,
             "motors_per_actuator": self.robot.motors_per_actuator,
-            "mount": match self.robot.mount { Mount::Ground => "ground", Mount::Clamped => "clamped", Mount::Free => "free" },
+            "mount": self.robot.mount.name(),
             "damping_eta": eta,
             "damping_time": time,
             "collision_thickness": self.robot.collision_thickness,

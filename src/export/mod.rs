@@ -13,7 +13,7 @@ pub use sidecar::sidecar;
 pub use urdf::urdf;
 pub use urdf_in::{UrdfError, bodies};
 
-use crate::model::{Robot, Segment};
+use crate::model::{Robot, Segment, box_inertia};
 
 /// A body of a URDF or MJCF file.
 struct Placed {
@@ -48,15 +48,15 @@ fn placed(robot: &Robot) -> Vec<Placed> {
                 frame: frame(i),
                 centre: if i == 0 { 0.0 } else { 0.5 * segment.length },
                 size,
-                inertia: box_inertia(segment.mass, size),
+                inertia: principal_inertias(segment.mass, size),
             }
         })
         .collect()
 }
 
-/// Principal inertias m (b² + c²)/12 of a homogeneous box (g·cm²).
-fn box_inertia(mass: f64, [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [mass / 12.0 * (y * y + z * z), mass / 12.0 * (x * x + z * z), mass / 12.0 * (x * x + y * y)]
+/// Principal moments of inertia (g·cm²) of a homogeneous box.
+fn principal_inertias(mass: f64, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [box_inertia(mass, y, z), box_inertia(mass, x, z), box_inertia(mass, x, y)]
 }
 
 /// Text for an XML comment, which must not contain two successive hyphens.

@@ -6,7 +6,7 @@ use roxmltree::Document;
 use thiserror::Error;
 use urdf_rs::{Geometry, Joint, JointType, Link};
 
-use super::box_inertia;
+use super::principal_inertias;
 use crate::model::{Robot, Segment};
 
 /// A URDF that is not a robot of this program.
@@ -194,7 +194,7 @@ fn body(link: &Link, base: bool, robot: &Robot) -> Result<f64, UrdfError> {
         }
     }
     let i = &link.inertial.inertia;
-    let needed = box_inertia(mass, [length, width, thickness]);
+    let needed = principal_inertias(mass, [length, width, thickness]);
     let diagonal = [i.ixx, i.iyy, i.izz].iter().zip(needed).all(|(found, needed)| same(*found, needed));
     if !diagonal || [i.ixy, i.ixz, i.iyz] != [0.0; 3] {
         return bad(format!("its inertia must be that of its box at even density, {needed:?}"));

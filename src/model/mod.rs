@@ -21,7 +21,7 @@ pub use extensions::{
     AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, StickSlip, VISCOUS_REACH,
 };
 pub use laminate::{Laminate, Material};
-pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment};
+pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment, box_inertia};
 
 use thiserror::Error;
 

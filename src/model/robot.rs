@@ -17,6 +17,9 @@ pub enum Mount {
 }
 
 impl Mount {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Ground, Self::Clamped, Self::Free];
+
     /// Name in experiment files.
     pub const fn name(self) -> &'static str {
         match self {
@@ -125,6 +128,12 @@ pub struct RigidBody {
     pub middle: f64,
 }
 
+/// Moment of inertia (g·cm²) of a homogeneous box about an axis through its centre along one edge, m (a² + b²)/12, where a and b (cm) are
+/// the other two edges.
+pub fn box_inertia(mass: f64, a: f64, b: f64) -> f64 {
+    mass / 12.0 * (a.powi(2) + b.powi(2))
+}
+
 /// Largest number of joints that an experiment may ask for.
 pub const MAX_JOINTS: usize = 10_000;
 
@@ -200,7 +209,7 @@ impl Robot {
         for (i, segment) in segments.iter().enumerate() {
             let length = segment.length;
             let last = i + 1 == segments.len();
-            let inertia = segment.mass / 12.0 * (length.powi(2) + self.collision_thickness.powi(2));
+            let inertia = box_inertia(segment.mass, length, self.collision_thickness);
             let mut body = RigidBody { mass: segment.mass, inertia, middle: 0.5 };
             let here = |point: &&PointMass| point.position >= left && (point.position < left + length || last);
             for point in self.extensions.point_masses.iter().filter(here) {

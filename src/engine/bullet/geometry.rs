@@ -3,7 +3,7 @@
 use super::COLLISION_MARGIN;
 use super::sliding::Sliding;
 use crate::bullet::{BaseState, BoxLink};
-use crate::model::{RigidBody, Robot, Segment};
+use crate::model::{RigidBody, Robot, Segment, box_inertia};
 
 /// The bodies as boxes whose hinges stand in the faces between them.
 pub(super) fn boxes(robot: &Robot, sliding: Option<&Sliding>) -> Vec<BoxLink> {
@@ -31,7 +31,7 @@ pub(super) fn boxes(robot: &Robot, sliding: Option<&Sliding>) -> Vec<BoxLink> {
 
 /// Moments of inertia (g·cm²) of a body with point masses; `None` for a plain box, whose inertia Bullet computes.
 pub(super) fn inertia(segment: &Segment, body: &RigidBody, width: f64, thickness: f64) -> Option<[f64; 3]> {
-    let of_box = |a: f64, b: f64| segment.mass / 12.0 * (a.powi(2) + b.powi(2));
+    let of_box = |a: f64, b: f64| box_inertia(segment.mass, a, b);
     // Point masses lie on the x axis of the box.
     let added = body.inertia - of_box(segment.length, thickness);
     (body.mass != segment.mass).then(|| [of_box(width, thickness), body.inertia, of_box(segment.length, width) + added])

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::config::ConfigError;
 use super::driven::Driven;
-use crate::drive::Table;
+use crate::drive::{Table, TableError};
 
 /// Reads the table for a robot whose material must bear the voltages. Columns may stand in any order; others are ignored.
 ///
@@ -46,11 +46,11 @@ fn parse(bytes: &[u8], actuators: usize, bears: impl Fn(f64) -> Result<(), Strin
         }
         lines.push(line);
     }
-    if times.is_empty() {
-        return Err("there are no rows".into());
-    }
-    Table::new(times, voltages, actuators)
-        .map_err(|row| format!("line {}: times must rise from row to row, and all values must be finite", lines[row]))
+    Table::new(times, voltages, actuators).map_err(|error| match error {
+        TableError::Empty => "there are no rows".into(),
+        TableError::Row(row) => format!("line {}: times must rise from row to row, and all values must be finite", lines[row]),
+        other => other.to_string(),
+    })
 }
 
 #[cfg(test)]

@@ -197,7 +197,7 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
         (eta, None) => eta.map_or(default.damping, Damping::Eta),
     };
     let f = &r.friction;
-    let mounts = [("ground", Mount::Ground), ("clamped", Mount::Clamped), ("free", Mount::Free)];
+    let mounts = Mount::ALL.map(|mount| (mount.name(), mount));
     let films = [("both-ends", Film::BothEnds), ("right-end", Film::RightEnd), ("none", Film::None)];
     Ok(Robot {
         material,
