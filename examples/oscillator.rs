@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::diagnosis::Verdict;
 use sfers::diagnose::pipeline::diagnose;
-use sfers::diagnose::plant::{Candidate, Free, Model, Plant, Signal};
+use sfers::diagnose::plant::{Candidate, Free, Model, Nuisance, Plant, Signal};
 
 const OMEGA: f64 = 2.0 * PI * 1.5;
 const ZETA: f64 = 0.05;
@@ -111,7 +111,7 @@ impl Plant for Oscillator {
         &self.candidates
     }
 
-    fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
+    fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let value = |id: &str, nominal: f64| {
             model.terms.iter().find(|term| self.candidates[term.candidate].id == id).map_or(nominal, |term| term.x[0])
         };

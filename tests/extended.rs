@@ -9,7 +9,7 @@ use std::path::Path;
 use common::sfers;
 use sfers::diagnose::dataset::Dataset;
 use sfers::diagnose::extended;
-use sfers::diagnose::plant::{Model, Plant, Term};
+use sfers::diagnose::plant::{Model, Nuisance, Plant, Term};
 use sfers::diagnose::quality;
 use sfers::diagnose::robot::RobotPlant;
 use sfers::experiment::{self, Control, Source};
@@ -34,11 +34,16 @@ fn write(folder: &Path, mount: &str, m: usize) {
     fs::write(folder.join("a.csv"), rows).unwrap();
 }
 
+/// Every jump after 0.4 of its interval.
+fn nuisance(plant: &RobotPlant) -> Nuisance {
+    Nuisance { shares: vec![0.4; plant.nuisances(0)], clock_s: 0.0 }
+}
+
 /// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.
 fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) -> Result<f64, Box<dyn std::error::Error>> {
-    let nuisances = vec![0.4; plant.nuisances(0)];
-    let predicted = plant.predict(model, 0, &nuisances)?;
-    let (toml, drive) = extended::experiment(dataset, plant, model, 0, &nuisances);
+    let nuisance = nuisance(plant);
+    let predicted = plant.predict(model, 0, &nuisance)?;
+    let (toml, drive) = extended::experiment(dataset, plant, model, 0, &nuisance.shares);
     fs::write(folder.join("extended.toml"), &toml).unwrap();
     fs::write(folder.join("drive.csv"), drive).unwrap();
     let source = Source::from_file(&folder.join("extended.toml")).unwrap();
@@ -78,8 +83,8 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
         write(folder.path(), mount, m);
         let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
         let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
-        let nominal = Model { terms: Vec::new(), resolution: m as f64, fine: true };
-        let plain = plant.predict(&nominal, 0, &vec![0.4; plant.nuisances(0)]).unwrap();
+        let nominal = Model::new(Vec::new(), m as f64, true);
+        let plain = plant.predict(&nominal, 0, &nuisance(&plant)).unwrap();
         let resolutions = [m as f64, 5.0];
         for resolution in resolutions {
             let found = apart(folder.path(), &dataset, &plant, &Model { resolution, ..nominal.clone() }).unwrap();
@@ -91,8 +96,8 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
                 for share in [1.0, 1e-3] {
                     // On the way from where the cause does nothing.
                     let x = start.iter().zip(&c.parameters).map(|(x, p)| p.off.map_or(*x, |off| off + share * (x - off)));
-                    let model = Model { terms: vec![Term { candidate, x: x.collect() }], resolution: 4.0, fine: true };
-                    let Ok(predicted) = plant.predict(&model, 0, &vec![0.4; plant.nuisances(0)]) else {
+                    let model = Model::new(vec![Term { candidate, x: x.collect() }], 4.0, true);
+                    let Ok(predicted) = plant.predict(&model, 0, &nuisance(&plant)) else {
                         // What cannot be simulated is not adopted.
                         refused.push(c.id);
                         continue;

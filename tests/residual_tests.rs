@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use common::random::Random;
 use sfers::diagnose::DiagnoseError;
-use sfers::diagnose::plant::{Candidate, Model, Plant, Signal};
+use sfers::diagnose::plant::{Candidate, Model, Nuisance, Plant, Signal};
 use sfers::diagnose::residual_tests::residual_tests;
 use sfers::diagnose::search::Split;
 
@@ -38,7 +38,7 @@ impl Plant for Measured {
         &[]
     }
 
-    fn predict(&self, _model: &Model, _run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
+    fn predict(&self, _model: &Model, _run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         Ok(Vec::new())
     }
 }

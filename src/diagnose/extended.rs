@@ -32,7 +32,7 @@ impl Files {
         let chi2 = |run: &usize| sum_of_squares(&outcome.calibrated.residuals[*run]);
         let all = outcome.split.all();
         let run = all.iter().copied().max_by(|a, b| chi2(a).total_cmp(&chi2(b))).unwrap_or(0);
-        let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run]);
+        let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run].shares);
         Self { experiment, drive, residuals: residuals(plant, outcome) }
     }
 }
@@ -132,7 +132,7 @@ fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
             let used = outcome.used[run][i];
             let predicted = [&outcome.nominal, &outcome.calibrated, &outcome.extended].map(|scored| {
                 // Masked values have no residuals.
-                let value = signal.values[i] - scored.residuals[run][i] * signal.sigmas[i];
+                let value = signal.values[i] - scored.plain[run][i] * signal.sigmas[i];
                 if used { format!("{value:?}") } else { String::new() }
             });
             let named = [&signal.id, role, &channels[signal.channels[i]]].map(str::to_owned);

@@ -14,7 +14,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::plant::{Model, Plant};
+use super::bench::{self, Columns, Spread};
+use super::noise::Noise;
+use super::plant::{Model, Nuisance, Plant};
 
 /// Step of finite differences as a share of a parameter's scale.
 const DIFFERENCE: f64 = 0.02;
@@ -41,8 +43,8 @@ pub enum Convergence {
     Full,
 }
 
-/// Nuisance parameters (0 to 1), runs × parameters.
-pub type Nuisances = Vec<Vec<f64>>;
+/// Nuisance parameters of every run.
+pub type Nuisances = Vec<Nuisance>;
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -65,6 +67,10 @@ pub struct Estimator<'a> {
     pub nuisances: Nuisances,
     /// True for the values that count, runs × values.
     pub used: Vec<Vec<bool>>,
+    /// Columns of the bench's faults of each run; none before the first [`set_faults`](Self::set_faults).
+    faults: Vec<Columns>,
+    /// The noise that residuals are whitened for.
+    pub noise: Noise,
     kept: Mutex<Kept>,
 }
 
@@ -93,34 +99,36 @@ impl Kept {
 }
 
 /// The bits of all that a prediction depends on.
-fn key(model: &Model, run: usize, nuisances: &[f64]) -> Vec<u64> {
+fn key(model: &Model, run: usize, nuisance: &Nuisance) -> Vec<u64> {
     let terms = model.terms.iter().flat_map(|term| {
         let numbers = term.x.iter().map(|x| x.to_bits());
         [term.candidate as u64, term.x.len() as u64].into_iter().chain(numbers)
     });
     let whole = [run as u64, model.resolution.to_bits(), u64::from(model.fine)];
-    whole.into_iter().chain(terms).chain(nuisances.iter().map(|x| x.to_bits())).collect()
+    let nuisance = nuisance.shares.iter().chain([&nuisance.clock_s]);
+    whole.into_iter().chain(terms).chain(nuisance.map(|x| x.to_bits())).collect()
 }
 
-/// Residuals of a run, in σ; 0 for values that do not count.
+/// Residuals of a run, in σ, 0 for values that do not count; behind those of the values, the bench's faults in their standard deviations.
 pub type Residuals = Vec<f64>;
 
 impl<'a> Estimator<'a> {
-    /// A plant with all values, and nuisance parameters of 1: a command is held until the row that shows its change.
+    /// A plant with all values, and shares of 1: a command is held until the row that shows its change.
     pub fn new(plant: &'a dyn Plant) -> Self {
-        let nuisances = (0..plant.signals().len()).map(|run| vec![1.0; plant.nuisances(run)]).collect();
+        let nuisances =
+            (0..plant.signals().len()).map(|run| Nuisance { shares: vec![1.0; plant.nuisances(run)], clock_s: 0.0 }).collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
-        Self { plant, nuisances, used, kept: Mutex::default() }
+        Self { plant, nuisances, used, faults: Vec::new(), noise: Noise::default(), kept: Mutex::default() }
     }
 
-    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Arc<Vec<f64>>, DiagnoseError> {
-        let key = key(model, run, nuisances);
+    fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Arc<Vec<f64>>, DiagnoseError> {
+        let key = key(model, run, nuisance);
         let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = kept().get(&key);
         if let Some(known) = known {
             return Ok(known);
         }
-        let predicted = Arc::new(self.plant.predict(model, run, nuisances)?);
+        let predicted = Arc::new(self.plant.predict(model, run, nuisance)?);
         kept().put(key, &predicted);
         Ok(predicted)
     }
@@ -130,14 +138,68 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn residuals(&self, model: &Model, run: usize) -> Result<Residuals, DiagnoseError> {
-        self.residuals_with(model, run, &self.nuisances[run])
+        self.residuals_with(model, run, &self.nuisance(model, run))
     }
 
-    fn residuals_with(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Residuals, DiagnoseError> {
+    /// The nuisance parameters of a run in a model: without clock offsets where their spread is 0.
+    fn nuisance(&self, model: &Model, run: usize) -> Nuisance {
+        let nuisance = self.nuisances[run].clone();
+        if model.spread.of[Spread::CLOCK] > 0.0 { nuisance } else { Nuisance { clock_s: 0.0, ..nuisance } }
+    }
+
+    fn residuals_with(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Residuals, DiagnoseError> {
+        let mut residuals = self.misfit(model, run, nuisance)?;
+        self.eliminate(model, run, &mut residuals);
+        Ok(residuals)
+    }
+
+    /// Whitened residuals of a run with the bench's faults in them.
+    fn misfit(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Residuals, DiagnoseError> {
+        let mut residuals = self.plain(model, run, nuisance)?;
+        self.noise.whiten(&self.plant.signals()[run], &self.used[run], &mut residuals);
+        Ok(residuals)
+    }
+
+    /// Differences of a run from its prediction, in σ.
+    fn plain(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Residuals, DiagnoseError> {
         let signal = &self.plant.signals()[run];
-        let predicted = self.predict(model, run, nuisances)?;
+        let predicted = self.predict(model, run, nuisance)?;
         let each = signal.values.iter().zip(&*predicted).zip(&signal.sigmas).zip(&self.used[run]);
         Ok(each.map(|(((y, f), sigma), used)| if *used { (y - f) / sigma } else { 0.0 }).collect())
+    }
+
+    /// Eliminates the bench's faults from residuals; returns log det of their prior covariance times their information.
+    fn eliminate(&self, model: &Model, run: usize, residuals: &mut Residuals) -> f64 {
+        self.faults.get(run).map_or(0.0, |columns| columns.eliminate(&model.spread, residuals))
+    }
+
+    /// Residuals of several runs, and what the spread of the bench's faults costs each (log det of [`bench`]).
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn costs_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<(Residuals, f64)>, DiagnoseError> {
+        let of = |run: &usize| {
+            let mut residuals = self.misfit(model, *run, &self.nuisance(model, *run))?;
+            let cost = self.eliminate(model, *run, &mut residuals);
+            Ok((residuals, cost))
+        };
+        runs.par_iter().map(of).collect()
+    }
+
+    /// Residuals of all runs, in given σ and not whitened, without the bench's faults.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn plain_residuals(&self, model: &Model) -> Result<Vec<Residuals>, DiagnoseError> {
+        let of = |run: usize| {
+            let nuisance = self.nuisance(model, run);
+            let mut residuals = self.plain(model, run, &nuisance)?;
+            if let Some(columns) = self.faults.get(run) {
+                columns.take_from(&model.spread, &self.misfit(model, run, &nuisance)?, &mut residuals);
+            }
+            Ok(residuals)
+        };
+        (0..self.plant.signals().len()).into_par_iter().map(of).collect()
     }
 
     /// Residuals of several runs, in σ.
@@ -329,6 +391,66 @@ impl<'a> Estimator<'a> {
         Ok(short.into_iter().zip(whole).map(|(short, whole)| least.max(short).max(few * whole)).collect())
     }
 
+    /// Sets the clock offset of each run to its estimate under `model`, and the columns of the bench's faults to the model's predictions.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn set_faults(&mut self, model: &Model) -> Result<(), DiagnoseError> {
+        // Half of a central difference (s).
+        const HALF: f64 = 1e-4;
+        let plant = self.plant;
+        for (run, faults) in self.faults_of(model)?.into_iter().enumerate() {
+            let nuisance = &mut self.nuisances[run];
+            nuisance.clock_s = faults.first().copied().unwrap_or(0.0);
+            // The inputs beyond the last row are not known.
+            let signal = &plant.signals()[run];
+            let end = signal.times.iter().copied().fold(0.0, f64::max) - nuisance.clock_s;
+            let counted = self.used[run].iter_mut().zip(&signal.times);
+            counted.filter(|(_, t)| **t > end + 1e-9).for_each(|(used, _)| *used = false);
+        }
+        let columns = |run: usize| -> Result<Columns, DiagnoseError> {
+            let signal = &plant.signals()[run];
+            let at = |by: f64| {
+                let nuisance = &self.nuisances[run];
+                self.predict(model, run, &Nuisance { clock_s: nuisance.clock_s + by, ..nuisance.clone() })
+            };
+            let (before, now, after) = (at(-HALF)?, at(0.0)?, at(HALF)?);
+            let rate: Vec<f64> = after.iter().zip(&*before).map(|(b, a)| (b - a) / (2.0 * HALF)).collect();
+            let weights: Vec<f64> =
+                signal.sigmas.iter().zip(&self.used[run]).map(|(sigma, used)| if *used { 1.0 / sigma } else { 0.0 }).collect();
+            let clock = self.nuisances[run].clock_s;
+            let whiten = |column: &mut [f64]| self.noise.whiten(signal, &self.used[run], column);
+            Ok(Columns::new(signal, [&now[..], &rate], &weights, clock, whiten))
+        };
+        let columns: Vec<Columns> = (0..plant.signals().len()).into_par_iter().map(columns).collect::<Result<_, _>>()?;
+        self.faults = columns;
+        Ok(())
+    }
+
+    /// The bench's faults of every run under `model`: clock offset (s), gain, zeros and drifts; empty before [`set_faults`](Self::set_faults).
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn faults_of(&self, model: &Model) -> Result<Vec<Vec<f64>>, DiagnoseError> {
+        let of = |run: usize| match self.faults.get(run) {
+            Some(columns) => Ok(columns.faults(&model.spread, &self.misfit(model, run, &self.nuisance(model, run))?)),
+            None => Ok(Vec::new()),
+        };
+        (0..self.plant.signals().len()).into_par_iter().map(of).collect()
+    }
+
+    /// The spread of the bench's faults that suits `model` on `runs` best.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn spread(&self, model: &Model, runs: &[usize]) -> Result<Spread, DiagnoseError> {
+        let with_clocks = runs.iter().filter_map(|run| Some((*run, self.faults.get(*run)?)));
+        let moments = with_clocks
+            .map(|(run, columns)| Ok(columns.moments(&self.misfit(model, run, &self.nuisances[run])?)))
+            .collect::<Result<Vec<_>, DiagnoseError>>()?;
+        Ok(bench::spread(&moments, &self.plant.bench(), 1.0))
+    }
+
     /// Masks single values whose residuals stand far above those around them in their channel, as after a tracker's slip, and returns their number.
     ///
     /// # Errors
@@ -341,8 +463,8 @@ impl<'a> Estimator<'a> {
         for run in 0..self.used.len() {
             let residuals = self.residuals(model, run)?;
             let channels = &self.plant.signals()[run].channels;
-            for at in 0..residuals.len() {
-                let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(residuals.len());
+            for at in 0..channels.len() {
+                let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(channels.len());
                 let mut around: Vec<f64> = near
                     .filter(|k| *k != at && channels[*k] == channels[at] && self.used[run][*k])
                     .map(|k| residuals[k].abs())
@@ -359,7 +481,7 @@ impl<'a> Estimator<'a> {
         Ok(count)
     }
 
-    /// Fits the nuisance parameters of each run, with the model held.
+    /// Fits the shares of each run, with the model held.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
@@ -367,7 +489,9 @@ impl<'a> Estimator<'a> {
         const STEP: f64 = 0.05;
         for &run in runs {
             for _ in 0..3 {
-                let shares = self.nuisances[run].clone();
+                let nuisance = self.nuisance(model, run);
+                let with = |shares: Vec<f64>| self.residuals_with(model, run, &Nuisance { shares, ..nuisance.clone() });
+                let shares = nuisance.shares.clone();
                 if shares.is_empty() {
                     break;
                 }
@@ -382,7 +506,7 @@ impl<'a> Estimator<'a> {
                     .into_par_iter()
                     .map(|k| {
                         let (moved, step) = shifted(k);
-                        let r = self.residuals_with(model, run, &moved)?;
+                        let r = with(moved)?;
                         Ok(r.iter().zip(&plain).map(|(a, b)| (a - b) / step).collect())
                     })
                     .collect::<Result<_, DiagnoseError>>()?;
@@ -405,14 +529,14 @@ impl<'a> Estimator<'a> {
                 let mut better = None;
                 for part in [1.0, 0.3, 0.1] {
                     let trial: Vec<f64> = shares.iter().zip(step.iter()).map(|(x, by)| (x + part * by).clamp(0.0, 1.0)).collect();
-                    let chi2 = sum_of_squares(&self.residuals_with(model, run, &trial)?);
+                    let chi2 = sum_of_squares(&with(trial.clone())?);
                     if chi2 < before {
                         better = Some((trial, chi2));
                         break;
                     }
                 }
                 let Some((trial, chi2)) = better else { break };
-                self.nuisances[run] = trial;
+                self.nuisances[run].shares = trial;
                 if before - chi2 < 1.0 {
                     break;
                 }

@@ -11,6 +11,7 @@
 //! Mech. Syst. Signal Process. 20 (2006) 505; J. Brynjarsdóttir and A. O'Hagan, "Learning about physical parameters: the importance of model
 //! discrepancy", Inverse Problems 30 (2014) 114007.
 
+pub mod bench;
 mod candidates;
 pub mod dataset;
 pub mod diagnosis;
@@ -19,6 +20,7 @@ pub mod extended;
 pub mod fit;
 mod intervals;
 pub mod names;
+pub mod noise;
 pub mod observations;
 #[cfg(feature = "view")]
 mod picture;

@@ -73,11 +73,15 @@ pub fn diagnose(
     let mut search = Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0 };
 
     progress("the nominal model");
-    let nominal = search.fitted(&Model { terms: Vec::new(), resolution: nominal_resolution, fine: true })?;
+    let nominal = search.fitted(&Model::new(Vec::new(), nominal_resolution, true))?;
     progress("constants of the nominal model");
     let mut calibrated = search.calibrated(start)?;
     let spikes = search.estimator.leave_out_spikes(calibrated.model())?;
     if spikes > 0 {
+        calibrated = search.calibrated(start)?;
+    }
+    progress("the noise");
+    if search.measure_noise(&calibrated)? {
         calibrated = search.calibrated(start)?;
     }
     let insufficient = insufficient_data(plant, &search.split);
@@ -87,7 +91,7 @@ pub fn diagnose(
     }
 
     // The refined nominal model: its misfit is what the causes have to explain.
-    let bare = search.fitted(&Model { terms: Vec::new(), resolution: best.model().resolution, fine: true })?;
+    let bare = search.fitted_at_its_spread(&Model { terms: Vec::new(), ..best.model().clone() })?;
     let mut judged = judge(&search, best, &bare, nominal_resolution)?;
     remarks.extend(judged.remark.take());
     // A cause whose interval contains its off value is not named.
@@ -152,7 +156,7 @@ pub fn diagnose(
     let ranked = |trial: &Trial| Ranked {
         id: search.id(trial.candidate).to_owned(),
         form: form(trial.candidate),
-        rmse_heldout_mm: rmse(plant, &search.estimator.used, &trial.scored.residuals, &search.split.held),
+        rmse_heldout_mm: rmse(plant, &search.estimator.used, &trial.scored.plain, &search.split.held),
         delta_bic: trial.scored.bic() - calibrated.bic(),
     };
     let sigmas: Vec<f64> = plant.signals().iter().flat_map(|signal| signal.sigmas.iter().copied()).collect();
@@ -346,6 +350,9 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
         best = search.settle(better)?;
         best = search.backward(best)?;
     }
+    if search.measure_noise(&best)? {
+        best = search.settle(best)?;
+    }
     let coarse_total = best.total();
     (search.progress)("the final refit");
     best = search.fitted(&Model { fine: true, ..best.model().clone() })?;
@@ -419,7 +426,7 @@ fn adopted(
     (search.progress)(&format!("the gain of {}", candidate.id));
     let mut without = best.model().clone();
     without.terms.remove(index);
-    let without = search.fitted(&without)?;
+    let without = search.fitted_at_its_spread(&without)?;
     let mut tied_with: Vec<String> =
         tied.iter().filter(|(at, _)| *at == index).map(|(_, trial)| search.id(trial.candidate).to_owned()).collect();
     tied_with.sort();
@@ -507,27 +514,27 @@ fn rmse(plant: &dyn Plant, used: &[Vec<bool>], residuals: &[Residuals], runs: &[
 fn stage(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], scored: &Scored, parameters: Vec<Estimate>) -> Stage {
     let all = split.all();
     let runs = all.iter().map(|&run| {
-        let r = &scored.residuals[run];
+        let r = &scored.plain[run];
         let count = used[run].iter().filter(|used| **used).count().max(1) as f64;
         RunError {
             id: plant.signals()[run].id.clone(),
             role: if split.held.contains(&run) { "held-out" } else { "fit" },
-            rmse_mm: rmse(plant, used, &scored.residuals, &[run]),
+            rmse_mm: rmse(plant, used, &scored.plain, &[run]),
             rmse_sigma: (r.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
         }
     });
     // Jackknife over runs.
-    let held = rmse(plant, used, &scored.residuals, &split.held);
+    let held = rmse(plant, used, &scored.plain, &split.held);
     let without: Vec<f64> = split
         .held
         .iter()
-        .map(|out| rmse(plant, used, &scored.residuals, &split.held.iter().copied().filter(|run| run != out).collect::<Vec<_>>()))
+        .map(|out| rmse(plant, used, &scored.plain, &split.held.iter().copied().filter(|run| run != out).collect::<Vec<_>>()))
         .collect();
     let n = without.len() as f64;
     let mean = without.iter().sum::<f64>() / n.max(1.0);
     let error = ((n - 1.0).max(0.0) / n.max(1.0) * without.iter().map(|value| (value - mean).powi(2)).sum::<f64>()).sqrt();
     Stage {
-        rmse_mm: rmse(plant, used, &scored.residuals, &all),
+        rmse_mm: rmse(plant, used, &scored.plain, &all),
         rmse_heldout_mm: held,
         rmse_heldout_ci95_mm: [(held - 1.96 * error).max(0.0), held + 1.96 * error],
         runs: runs.collect(),

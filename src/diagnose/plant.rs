@@ -1,6 +1,7 @@
 //! A measured system with its model: parameters in, predicted signals out.
 
 use super::DiagnoseError;
+use super::bench::{self, Spread};
 
 /// A fitted parameter. The fit uses a coordinate, the value or its inverse, in which the effect vanishes at a finite point.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +62,15 @@ pub struct Term {
     pub x: Vec<f64>,
 }
 
+/// What differs from run to run and is not part of the model.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Nuisance {
+    /// [`Plant::nuisances`] numbers between 0 and 1.
+    pub shares: Vec<f64>,
+    /// Clock of the signals ahead of that of the inputs (s): a value at time t is predicted at t + this.
+    pub clock_s: f64,
+}
+
 /// The nominal model with causes added, and its discretisation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -70,6 +80,15 @@ pub struct Model {
     pub resolution: f64,
     /// True for half the time step, as in the final refit.
     pub fine: bool,
+    /// Spread of the bench's faults between runs.
+    pub spread: Spread,
+}
+
+impl Model {
+    /// A model without faults of the bench.
+    pub fn new(terms: Vec<Term>, resolution: f64, fine: bool) -> Self {
+        Self { terms, resolution, fine, spread: Spread::default() }
+    }
 }
 
 /// A measured run without missing and unusable values.
@@ -113,14 +132,20 @@ pub trait Plant: Sync {
         0
     }
 
+    /// Standard deviations of the bench's faults that are known, in the order of [`Spread::of`]; the others are estimated.
+    fn bench(&self) -> [Option<f64>; bench::KINDS] {
+        [None; bench::KINDS]
+    }
+
     /// True if a term exceeds the error of the discretisation.
     fn is_credible(&self, _term: &Term, _resolution: f64) -> bool {
         true
     }
 
-    /// The values that `model` predicts for `run`, in the order and unit of [`Signal::values`].
+    /// The values that `model` predicts for `run`, in the order and unit of [`Signal::values`]. A plant that does not know its inputs between the
+    /// rows may ignore the clock: clock offsets are then no nuisance parameters.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated; [`DiagnoseError::Plant`] takes any error or text.
-    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError>;
+    fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError>;
 }

@@ -164,7 +164,7 @@ fn rows(signal: &Signal, channel: usize) -> Vec<usize> {
 fn motion(out: &mut String, outcome: &Outcome, run: usize, signal: &Signal, channel: usize, label: &str, index: usize) {
     let rows = rows(signal, channel);
     out.push_str("<div class=\"pair\">\n");
-    for (kind, residuals) in [("nominal", &outcome.nominal.residuals[run]), ("extended", &outcome.extended.residuals[run])] {
+    for (kind, residuals) in [("nominal", &outcome.nominal.plain[run]), ("extended", &outcome.extended.plain[run])] {
         let mut f = Figure::new(&format!("{}: {kind} model", signal.id), "time (s)", label);
         f.size(HALF);
         let used = |i: &&usize| outcome.used[run][**i];

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::candidates::candidates;
 use super::dataset::Dataset;
-use super::plant::{Candidate, Model, Plant, Signal, Term};
+use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::track::{ON_STEP, track};
 use super::voltage::Command;
@@ -116,7 +116,7 @@ impl RobotPlant {
     fn longest_step(&self, run: usize) -> f64 {
         let finest = self.steps[run];
         let limit = 0.09 / (analytic::cantilever_frequency(&self.robot) * (self.robot.actuators as f64).powi(2));
-        let ends = vec![1.0; self.nuisances(run)];
+        let ends = Nuisance { shares: vec![1.0; self.nuisances(run)], clock_s: 0.0 };
         let with = |step: f64| self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok();
         let (Some(fine), Mount::Clamped) = (with(finest), self.robot.mount) else { return finest };
         let sigmas = &self.signals[run].sigmas;
@@ -252,9 +252,9 @@ impl Plant for RobotPlant {
         !candidate.is_constant || term.x.iter().any(|x| (x - 1.0).abs() > tolerance)
     }
 
-    fn predict(&self, model: &Model, run: usize, nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
+    fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let step = self.step(run) * if model.fine { 0.5 } else { 1.0 };
-        self.predict_with(&model.terms, model.resolution, run, nuisances, step)
+        self.predict_with(&model.terms, model.resolution, run, nuisance, step)
     }
 }
 
@@ -289,10 +289,10 @@ impl RobotPlant {
         terms: &[Term],
         resolution: f64,
         run: usize,
-        nuisances: &[f64],
+        nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let table = self.commands[run].table(nuisances);
+        let table = self.commands[run].table(&nuisance.shares);
         let Setup { robot, drive, chain, view } =
             self.setup(self.robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
@@ -300,7 +300,7 @@ impl RobotPlant {
         let mut times = signal.times.clone();
         times.sort_by(f64::total_cmp);
         times.dedup();
-        let seen: Vec<f64> = times.iter().map(|t| (t - view.delay).max(0.0)).collect();
+        let seen: Vec<f64> = times.iter().map(|t| (t + nuisance.clock_s - view.delay).max(0.0)).collect();
         let tracks = track(&robot, 0.0, &drive, chain, step, &self.markers, &seen)?;
         let n = self.markers.len();
         let at = |(t, channel): (&f64, &usize)| {

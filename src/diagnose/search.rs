@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::dataset::Role;
 use super::fit::{BLOCK, Convergence, Estimator, Fit, Residuals, coordinates, sum_of_squares};
+use super::noise;
 use super::plant::{Free, Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
@@ -31,6 +32,8 @@ const FINALISTS: usize = 7;
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
+/// Most alternations between the spread of the bench's faults and the model.
+const MOST_SPREADS: usize = 3;
 /// Most causes in addition to the constants.
 const MOST_CAUSES: usize = 4;
 
@@ -57,23 +60,28 @@ impl Split {
 pub struct Scored {
     /// The fit to the fit runs.
     pub fit: Fit,
-    /// Residuals of all runs, in σ.
+    /// Residuals of all runs, whitened.
     pub residuals: Vec<Residuals>,
-    /// χ² of the held-out runs.
+    /// Residuals of all runs in the given σ, without the bench's faults.
+    pub plain: Vec<Residuals>,
+    /// What the spread of the bench's faults costs in each run (log det of [`bench`](super::bench)).
+    pub spread_costs: Vec<f64>,
+    /// Cost of the held-out runs: χ² and that of the spread.
     pub held: f64,
-    /// χ² of the fit runs.
+    /// Cost of the fit runs.
     pub fitted: f64,
 }
 
 impl Scored {
-    /// χ² of all runs.
+    /// Cost of all runs.
     pub fn total(&self) -> f64 {
         self.held + self.fitted
     }
 
     /// χ² per value above 1, for `count` values in all runs.
     pub(super) fn above(&self, count: usize) -> f64 {
-        (self.total() / count as f64 - 1.0).max(0.0)
+        let chi2: f64 = self.residuals.iter().map(|r| sum_of_squares(r)).sum();
+        (chi2 / count as f64 - 1.0).max(0.0)
     }
 
     /// The model.
@@ -135,9 +143,16 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the model cannot be simulated, as for all fits.
     pub fn score(&self, fit: Fit) -> Result<Scored, DiagnoseError> {
         let all: Vec<usize> = (0..self.estimator.plant.signals().len()).collect();
-        let residuals = self.estimator.residuals_of(&fit.model, &all)?;
-        let sum = |runs: &[usize]| runs.iter().map(|run| sum_of_squares(&residuals[*run])).sum();
-        Ok(Scored { held: sum(&self.split.held), fitted: sum(&self.split.fit), fit, residuals })
+        let (residuals, spread_costs): (Vec<_>, Vec<_>) = self.estimator.costs_of(&fit.model, &all)?.into_iter().unzip();
+        let sum = |runs: &[usize]| runs.iter().map(|run| sum_of_squares(&residuals[*run]) + spread_costs[*run]).sum();
+        Ok(Scored {
+            held: sum(&self.split.held),
+            fitted: sum(&self.split.fit),
+            plain: self.estimator.plain_residuals(&fit.model)?,
+            fit,
+            residuals,
+            spread_costs,
+        })
     }
 
     /// Fits a model and scores it.
@@ -145,12 +160,34 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn fitted(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+        self.fit_with_spread(model, Convergence::Full)
+    }
+
+    /// Fits a model with its spread of the bench's faults as it is, and scores it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn fitted_at_its_spread(&self, model: &Model) -> Result<Scored, DiagnoseError> {
         self.score(self.estimator.fit(model, &self.split.fit, Convergence::Full)?)
+    }
+
+    /// Fits a model and the spread of the bench's faults in turn, and scores it.
+    fn fit_with_spread(&self, model: &Model, convergence: Convergence) -> Result<Scored, DiagnoseError> {
+        let mut best = self.score(self.estimator.fit(model, &self.split.fit, convergence)?)?;
+        for _ in 0..MOST_SPREADS {
+            let spread = self.estimator.spread(best.model(), &self.split.all())?;
+            if spread == best.model().spread {
+                break;
+            }
+            let model = Model { spread, ..best.model().clone() };
+            best = self.score(self.estimator.fit(&model, &self.split.fit, convergence)?)?;
+        }
+        Ok(best)
     }
 
     /// Fits a model to the convergence of [`Convergence::Rank`] and scores it.
     fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
-        self.score(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?)
+        self.fit_with_spread(model, Convergence::Rank)
     }
 
     /// Alternates fits of nuisance parameters and model until χ² has converged.
@@ -162,6 +199,7 @@ impl Search<'_> {
         let all = self.split.all();
         for _ in 0..MOST_TURNS {
             let before = scored.total();
+            self.estimator.set_faults(scored.model())?;
             self.estimator.fit_nuisances(scored.model(), &all)?;
             scored = self.fitted(scored.model())?;
             if before - scored.total()
@@ -189,6 +227,7 @@ impl Search<'_> {
                 }
                 structure += along * along;
             }
+            sum += worse.spread_costs[*run] - better.spread_costs[*run];
         }
         (sum / (2.0 * f64::max(apart, structure).sqrt()).max(1e-9), sum)
     }
@@ -207,6 +246,21 @@ impl Search<'_> {
     pub fn is_tied(&self, better: &Scored, other: &Scored) -> bool {
         let (sigmas, gap) = self.gap(better, other, &self.split.all());
         gap < TIED_CHI2 || sigmas < 2.0
+    }
+
+    /// Sets the noise to that of what does not repeat in the residuals of `scored`, if it differs from the present one; true if it does.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn measure_noise(&mut self, scored: &Scored) -> Result<bool, DiagnoseError> {
+        let estimator = &mut self.estimator;
+        let Some(noise) = noise::estimate(estimator.plant.signals(), &estimator.used, &scored.plain) else { return Ok(false) };
+        if !noise.differs(&estimator.noise) {
+            return Ok(false);
+        }
+        estimator.noise = noise;
+        estimator.set_faults(scored.model())?;
+        Ok(true)
     }
 
     /// All constants at their nominal values, as terms.
@@ -231,7 +285,7 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if a model cannot be simulated.
     pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, DiagnoseError> {
-        let scored = self.fitted(&Model { terms: self.constants(), resolution, fine: false })?;
+        let scored = self.fitted(&Model::new(self.constants(), resolution, false))?;
         let scored = self.settle(scored)?;
         let (chi2, runs) =
             if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) };
@@ -734,7 +788,7 @@ mod tests {
             &self.candidates
         }
 
-        fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
+        fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
             let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
             Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
         }

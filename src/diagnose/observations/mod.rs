@@ -16,7 +16,7 @@ use super::dataset::{Dataset, Observation};
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
 use super::fit::{Convergence, Estimator, Fit};
 use super::names;
-use super::plant::{Candidate, Model, Plant, Signal, Term};
+use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 use crate::experiment::{self, Control, EffectConfig, Source};
 use crate::number::fixed;
 use config::config;
@@ -48,7 +48,7 @@ impl Plant for Numbers<'_> {
         &self.candidates
     }
 
-    fn predict(&self, model: &Model, run: usize, _nuisances: &[f64]) -> Result<Vec<f64>, DiagnoseError> {
+    fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let observation = &self.dataset.observations[run];
         let mut config = config(&self.dataset.nominal, observation)?;
         for term in &model.terms {
@@ -125,7 +125,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
     let runs: Vec<usize> = (0..plant.signals.len()).collect();
     let estimator = Estimator::new(&plant);
     let resolution = dataset.robot.motors_per_actuator as f64;
-    let nominal = Model { terms: Vec::new(), resolution, fine: false };
+    let nominal = Model::new(Vec::new(), resolution, false);
     let nominal = estimator.fit(&nominal, &runs, Convergence::Full)?;
     let count = runs.len() as f64;
 
@@ -135,7 +135,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         progress(c.id);
         let tried = c.starts.iter().filter_map(|x| {
             let terms = vec![Term { candidate, x: x.clone() }];
-            estimator.fit(&Model { terms, resolution, fine: false }, &runs, Convergence::Full).ok()
+            estimator.fit(&Model::new(terms, resolution, false), &runs, Convergence::Full).ok()
         });
         fits.extend(tried.min_by(|a, b| a.chi2.total_cmp(&b.chi2)));
     }
@@ -147,7 +147,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
             for b in &constants[index + 1..] {
                 progress(&format!("{} with {}", plant.candidates[*a].id, plant.candidates[*b].id));
                 let term = |candidate: usize| Term { candidate, x: vec![1.0] };
-                let start = Model { terms: vec![term(*a), term(*b)], resolution, fine: false };
+                let start = Model::new(vec![term(*a), term(*b)], resolution, false);
                 pairs.extend(estimator.fit(&start, &runs, Convergence::Full).ok().filter(|fit| fit.chi2 <= EXPLAINED * count));
             }
         }

@@ -1,0 +1,265 @@
+//! Level and correlation time of the noise, from what does not repeat.
+//!
+//! Where the input is periodic or constant, everything deterministic is periodic with it or settles. Harmonics of the input and a linear trend are
+//! removed from residuals there; what is left is noise, whatever the model lacks. Its autocorrelation is fitted by white noise beside a first-order
+//! Gauss-Markov process (Bryson and Ho, Applied Optimal Control, 1975, chapter 11),
+//!
+//! ```text
+//! ρ(Δt) = (1 − c) [Δt = 0] + c exp(−Δt/T)
+//! ```
+//!
+//! and residuals are whitened by the innovations of the Kalman filter of this process, which is linear in them and exact for uneven rows.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::plant::Signal;
+
+/// Harmonics that are removed where the input is periodic.
+const HARMONICS: usize = 10;
+/// Least number of periods and of values in a stretch.
+const LEAST_PERIODS: f64 = 4.0;
+const LEAST_VALUES: usize = 25;
+/// Share of a stretch, from its beginning, in which transients decay.
+const TRANSIENT: f64 = 0.4;
+/// A channel's level needs this number of degrees of freedom.
+const LEAST_FREEDOM: f64 = 100.0;
+/// Levels that differ by less (natural logarithm) are the same.
+const LEVEL_TOLERANCE: f64 = 0.2;
+/// Noise of more than this multiple of the level that neighbouring rows or the description give is no noise.
+const LARGEST_FACTOR: f64 = 3.0;
+/// Longest lag of the autocorrelation (s).
+const LONGEST_LAG: f64 = 0.4;
+/// Correlated noise is assumed from this share on.
+const LEAST_SHARE: f64 = 0.1;
+/// Autocorrelations below this are oscillations, which are no noise of this kind.
+const LEAST_CORRELATION: f64 = -0.35;
+
+/// Noise of a plant's channels.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Noise {
+    /// Factor on the given standard deviation of each channel (–); empty for the given ones.
+    pub factors: Vec<f64>,
+    /// Share c of the variance that is correlated (–).
+    pub correlated: f64,
+    /// Its correlation time T (s).
+    pub time_s: f64,
+}
+
+/// What is left of a stretch of residuals without its trend and harmonics.
+struct Rest {
+    channel: usize,
+    /// Interval of the rows (s).
+    interval: f64,
+    values: Vec<f64>,
+    /// Number of values less that of fitted coefficients.
+    freedom: f64,
+}
+
+/// Period (s) of a sampled input: the mean distance of its upward crossings of the mean, if they are evenly spaced; none otherwise.
+fn period(times: &[f64], inputs: &[f64]) -> Option<f64> {
+    let (low, high) = inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+    let middle = 0.5 * (low + high);
+    let mut crossings = Vec::new();
+    for (t, u) in times.windows(2).zip(inputs.windows(2)) {
+        if u[0] < middle && u[1] >= middle {
+            crossings.push(t[0] + (middle - u[0]) / (u[1] - u[0]) * (t[1] - t[0]));
+        }
+    }
+    let [first, .., last] = crossings[..] else { return None };
+    let period = (last - first) / (crossings.len() - 1) as f64;
+    let row = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
+    let even = crossings.iter().enumerate().all(|(k, t)| (t - first - k as f64 * period).abs() < 0.02 * period + row);
+    (even && high > low).then_some(period)
+}
+
+/// Rows (first, end) of stretches of a run, without their transients, and the period of each; none for constant inputs.
+fn stretches(times: &[f64], inputs: &[f64]) -> Vec<(usize, usize, Option<f64>)> {
+    let n = times.len();
+    let later = |from: usize, to: usize| from + ((to - from) as f64 * TRANSIENT) as usize;
+    if n >= LEAST_VALUES
+        && let Some(period) = period(times, inputs)
+    {
+        let from = later(0, n);
+        let periods = (times[n - 1] - times[from]) / period;
+        let rows = (n - from) as f64 / periods;
+        return if periods >= LEAST_PERIODS && rows > 4.0 { vec![(from, n, Some(period))] } else { Vec::new() };
+    }
+    let (mut all, mut from) = (Vec::new(), 0);
+    for row in 1..=n {
+        if row == n || (inputs[row] - inputs[from]).abs() > 1e-9 {
+            let first = later(from, row);
+            if row - first >= LEAST_VALUES {
+                all.push((first, row, None));
+            }
+            from = row;
+        }
+    }
+    all
+}
+
+/// Residuals without trend and harmonics; none if there are too few.
+fn without_trend(times: &[f64], values: &[f64], period: Option<f64>) -> Option<(Vec<f64>, f64)> {
+    let (n, from) = (times.len(), times[0]);
+    let length = times[n - 1] - from;
+    // No harmonics beyond half of the rows' rate.
+    let rate = (n - 1) as f64 / length;
+    let harmonics = period.map_or(0, |period| HARMONICS.min((0.5 * rate * period) as usize));
+    let columns = 2 + 2 * harmonics;
+    if n < columns + LEAST_VALUES / 2 {
+        return None;
+    }
+    let basis = |row: usize, column: usize| {
+        let t = times[row] - from;
+        match column {
+            0 => 1.0,
+            1 => 2.0 * t / length - 1.0,
+            _ => {
+                let angle = std::f64::consts::TAU * (column / 2) as f64 * t / period.unwrap_or(1.0);
+                if column % 2 == 0 { angle.cos() } else { angle.sin() }
+            }
+        }
+    };
+    let matrix = DMatrix::from_fn(n, columns, basis);
+    let right = DVector::from_column_slice(values);
+    let fitted = (matrix.transpose() * &matrix).cholesky()?.solve(&(matrix.transpose() * &right));
+    let rest = right - matrix * fitted;
+    Some((rest.iter().copied().collect(), (n - columns) as f64))
+}
+
+fn rests(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) -> Vec<Rest> {
+    let mut all = Vec::new();
+    for ((signal, used), residuals) in signals.iter().zip(used).zip(residuals) {
+        let channels = signal.channels.iter().max().map_or(0, |last| last + 1);
+        for channel in 0..channels {
+            let rows: Vec<usize> = (0..signal.values.len()).filter(|i| signal.channels[*i] == channel && used[*i]).collect();
+            let of = |values: &[f64]| -> Vec<f64> { rows.iter().map(|i| values[*i]).collect() };
+            let (times, inputs, values) = (of(&signal.times), of(&signal.inputs), of(residuals));
+            for (from, to, period) in stretches(&times, &inputs) {
+                if let Some((values, freedom)) = without_trend(&times[from..to], &values[from..to], period) {
+                    let interval = (times[to - 1] - times[from]) / (to - from - 1) as f64;
+                    all.push(Rest { channel, interval, values, freedom });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Variance of a stretch.
+fn variance(rest: &Rest) -> f64 {
+    rest.values.iter().map(|r| r * r).sum::<f64>() / rest.freedom
+}
+
+/// A low quantile of the variances of stretches, by their degrees of freedom: what is not noise can only raise some.
+fn low_quantile<'a>(rests: impl Iterator<Item = &'a Rest>) -> Option<f64> {
+    let mut all: Vec<(f64, f64)> = rests.map(|rest| (variance(rest), rest.freedom)).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = all.iter().map(|(_, freedom)| freedom).sum();
+    let mut sum = 0.0;
+    all.into_iter().filter(|_| whole >= LEAST_FREEDOM).find_map(|(variance, freedom)| {
+        sum += freedom;
+        (sum >= 0.4 * whole).then_some(variance)
+    })
+}
+
+/// The noise that the residuals (σ) of a model show, run after run; none if too few values repeat, or if what is left oscillates.
+pub fn estimate(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) -> Option<Noise> {
+    let rests = rests(signals, used, residuals);
+    let channels = signals.iter().flat_map(|signal| signal.channels.iter()).max()? + 1;
+    let levels: Vec<Option<f64>> = (0..channels).map(|c| low_quantile(rests.iter().filter(|rest| rest.channel == c))).collect();
+    // Channels without enough values have the others' mean factor.
+    let known: Vec<f64> = levels.iter().flatten().copied().collect();
+    let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+    if known.is_empty() || mean <= 0.0 || known.iter().any(|level| *level > LARGEST_FACTOR * LARGEST_FACTOR) {
+        return None;
+    }
+    let typical: Vec<&Rest> = rests.iter().filter(|rest| variance(rest) <= 2.0 * levels[rest.channel].unwrap_or(mean)).collect();
+    let (correlated, time_s) = correlation(&typical)?;
+    Some(Noise { factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(), correlated, time_s })
+}
+
+/// Share and correlation time (s) that fit the autocorrelations best; none if these oscillate.
+fn correlation(rests: &[&Rest]) -> Option<(f64, f64)> {
+    // Lag (s), autocorrelation, weight.
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    for rest in rests {
+        let own = variance(rest) * rest.freedom;
+        let most = ((LONGEST_LAG / rest.interval) as usize).min(rest.values.len() / 4);
+        for lag in 1..=most {
+            let sum: f64 = rest.values.iter().zip(&rest.values[lag..]).map(|(a, b)| a * b).sum();
+            points.push([lag as f64 * rest.interval, sum / own, rest.freedom]);
+        }
+    }
+    // Means over a third of an octave.
+    let mut bins: std::collections::BTreeMap<i32, [f64; 2]> = std::collections::BTreeMap::new();
+    for [lag, value, weight] in &points {
+        let bin = bins.entry((3.0 * lag.log2()).floor() as i32).or_default();
+        bin[0] += weight * value;
+        bin[1] += weight;
+    }
+    if bins.values().any(|[sum, weight]| sum / weight < LEAST_CORRELATION) {
+        return None;
+    }
+    let mut best = (0.0, 0.0, 0.0);
+    for k in 0..40 {
+        let time = 1e-3 * 10f64.powf(k as f64 / 13.0);
+        let (mut ab, mut bb) = (0.0, 0.0);
+        for [lag, value, weight] in &points {
+            let model = (-lag / time).exp();
+            ab += weight * value * model;
+            bb += weight * model * model;
+        }
+        if bb > 0.0 && ab > 0.0 && ab * ab / bb > best.0 {
+            best = (ab * ab / bb, (ab / bb).min(1.0), time);
+        }
+    }
+    let (_, share, time) = best;
+    Some(if share >= LEAST_SHARE { (share, time) } else { (0.0, 0.0) })
+}
+
+impl Noise {
+    /// True if it contradicts the given standard deviations or white noise by more than estimates from some hundred values scatter.
+    pub fn differs(&self, other: &Self) -> bool {
+        let factor = |of: &Self, k: usize| of.factors.get(k).copied().unwrap_or(1.0);
+        let level = |k: usize| (factor(self, k) / factor(other, k)).ln().abs() > LEVEL_TOLERANCE;
+        (0..self.factors.len().max(other.factors.len())).any(level) || (self.correlated - other.correlated).abs() > LEAST_SHARE
+    }
+
+    /// Values per independent one at an `interval` (s) of rows: 1 + 2 Σ ρ.
+    pub fn inflation(&self, interval: f64) -> f64 {
+        if self.correlated == 0.0 {
+            return 1.0;
+        }
+        let decay = (-interval / self.time_s).exp();
+        1.0 + 2.0 * self.correlated * decay / (1.0 - decay)
+    }
+
+    /// Replaces residuals (σ, channel after channel, at `times` in s) by their innovations of unit variance; those that do not count are skipped.
+    pub fn whiten(&self, signal: &Signal, used: &[bool], residuals: &mut [f64]) {
+        if self.factors.is_empty() {
+            return;
+        }
+        let white = 1.0 - self.correlated;
+        // Channel, time, mean and variance of the correlated part after the last row.
+        let mut last: Option<(usize, f64, f64, f64)> = None;
+        for (i, r) in residuals.iter_mut().enumerate().take(signal.values.len()) {
+            let (channel, t) = (signal.channels[i], signal.times[i]);
+            *r /= self.factors[channel];
+            if self.correlated == 0.0 || !used[i] {
+                continue;
+            }
+            let (mean, variance) = match last {
+                Some((before, at, mean, variance)) if before == channel => {
+                    let decay = (-(t - at) / self.time_s).exp();
+                    (decay * mean, decay * decay * variance + (1.0 - decay * decay) * self.correlated)
+                }
+                _ => (0.0, self.correlated),
+            };
+            let innovation = *r - mean;
+            let total = variance + white;
+            let gain = variance / total;
+            last = Some((channel, t, mean + gain * innovation, (1.0 - gain) * variance));
+            *r = innovation / total.sqrt();
+        }
+    }
+}
