@@ -36,7 +36,7 @@ fn write(folder: &Path, mount: &str, m: usize) {
 
 /// Every jump after 0.4 of its interval.
 fn nuisance(plant: &RobotPlant) -> Nuisance {
-    Nuisance { shares: vec![0.4; plant.nuisances(0)], clock_s: 0.0 }
+    Nuisance { shares: vec![0.4; plant.nuisances(0)], ..Nuisance::default() }
 }
 
 /// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.

@@ -52,6 +52,7 @@ pub(crate) struct Description {
     robot: RobotConfig,
     markers: BTreeMap<String, f64>,
     noise: BTreeMap<String, f64>,
+    bench: Bench,
     run: Vec<RunEntry>,
     observation: Vec<Observation>,
 }
@@ -61,6 +62,32 @@ pub(crate) struct Description {
 pub(crate) struct About {
     name: String,
     about: String,
+}
+
+/// How much the bench differs from run to run: one standard deviation each; estimated from the data where absent, none where 0.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Bench {
+    /// Offset between the clocks of camera and voltage (ms).
+    pub clock_ms: Option<f64>,
+    /// Zero of every coordinate (mm).
+    pub zero_mm: Option<f64>,
+    /// Gain of the motion (–).
+    pub gain: Option<f64>,
+    /// Drift of every coordinate (mm/s).
+    pub drift_mm_per_s: Option<f64>,
+}
+
+impl Bench {
+    /// Keys, values and largest values.
+    fn entries(&self) -> [(&'static str, Option<f64>, f64); 4] {
+        [
+            ("clock_ms", self.clock_ms, 1e3),
+            ("zero_mm", self.zero_mm, 1e3),
+            ("gain", self.gain, 1.0),
+            ("drift_mm_per_s", self.drift_mm_per_s, 1e3),
+        ]
+    }
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -151,6 +178,8 @@ pub struct Dataset {
     pub markers: Vec<Marker>,
     /// Standard deviation of each channel (mm), if given.
     pub noise: Vec<Option<f64>>,
+    /// How much the bench differs from run to run, as far as it is known.
+    pub bench: Bench,
     /// The runs.
     pub runs: Vec<MeasuredRun>,
     /// Single measured numbers, in place of runs.

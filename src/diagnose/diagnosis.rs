@@ -106,6 +106,35 @@ pub struct Correlation {
     pub coefficient: f64,
 }
 
+/// A fault of the bench in one run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunFault {
+    /// The run.
+    pub run: String,
+    /// The channel; none if the fault is of all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<String>,
+    /// The estimate, in the fault's unit.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
+/// A fault of the bench that differs from run to run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BenchFault {
+    /// `clock offset`, `clock rate`, `gain`, `zero` or `drift`.
+    pub id: &'static str,
+    /// Unit of the values; empty for shares.
+    pub unit: String,
+    /// Standard deviation between runs.
+    pub spread: f64,
+    /// True if that was given, false if it was estimated.
+    pub given: bool,
+    /// The estimates of all runs.
+    pub runs: Vec<RunFault>,
+}
+
 /// The result of a diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -125,6 +154,12 @@ pub struct Diagnosis {
     pub unexplained: Vec<String>,
     /// Standard deviation of the noise (mm), averaged over all values.
     pub noise_mm: f64,
+    /// Share of the noise's variance that is correlated from row to row (–).
+    pub noise_correlated: f64,
+    /// Its correlation time (s); 0 for white noise.
+    pub noise_correlation_time_s: f64,
+    /// Faults of the bench that differ from run to run, as far as the data ask for them.
+    pub bench: Vec<BenchFault>,
     /// The nominal model.
     pub baseline: Stage,
     /// The nominal model with re-tuned constants and refined discretisation.

@@ -67,11 +67,22 @@ pub struct Estimator<'a> {
     pub nuisances: Nuisances,
     /// True for the values that count, runs × values.
     pub used: Vec<Vec<bool>>,
+    /// True while only faults of known spread are nuisance parameters.
+    pub only_given_faults: bool,
     /// Columns of the bench's faults of each run; none before the first [`set_faults`](Self::set_faults).
     faults: Vec<Columns>,
     /// The noise that residuals are whitened for.
     pub noise: Noise,
     kept: Mutex<Kept>,
+}
+
+/// What an [`Estimator`] has found out of the data beside the model.
+#[derive(Debug, Clone)]
+pub struct State {
+    nuisances: Nuisances,
+    used: Vec<Vec<bool>>,
+    faults: Vec<Columns>,
+    noise: Noise,
 }
 
 /// Cache of predictions in two generations. Fits begin where others ended, so one prediction in five is repeated.
@@ -105,7 +116,7 @@ fn key(model: &Model, run: usize, nuisance: &Nuisance) -> Vec<u64> {
         [term.candidate as u64, term.x.len() as u64].into_iter().chain(numbers)
     });
     let whole = [run as u64, model.resolution.to_bits(), u64::from(model.fine)];
-    let nuisance = nuisance.shares.iter().chain([&nuisance.clock_s]);
+    let nuisance = nuisance.shares.iter().chain([&nuisance.clock_s, &nuisance.clock_rate]);
     whole.into_iter().chain(terms).chain(nuisance.map(|x| x.to_bits())).collect()
 }
 
@@ -115,10 +126,19 @@ pub type Residuals = Vec<f64>;
 impl<'a> Estimator<'a> {
     /// A plant with all values, and shares of 1: a command is held until the row that shows its change.
     pub fn new(plant: &'a dyn Plant) -> Self {
-        let nuisances =
-            (0..plant.signals().len()).map(|run| Nuisance { shares: vec![1.0; plant.nuisances(run)], clock_s: 0.0 }).collect();
+        let nuisances = (0..plant.signals().len())
+            .map(|run| Nuisance { shares: vec![1.0; plant.nuisances(run)], ..Nuisance::default() })
+            .collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
-        Self { plant, nuisances, used, faults: Vec::new(), noise: Noise::default(), kept: Mutex::default() }
+        Self {
+            plant,
+            nuisances,
+            used,
+            only_given_faults: false,
+            faults: Vec::new(),
+            noise: Noise::default(),
+            kept: Mutex::default(),
+        }
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Arc<Vec<f64>>, DiagnoseError> {
@@ -144,7 +164,7 @@ impl<'a> Estimator<'a> {
     /// The nuisance parameters of a run in a model: without clock offsets where their spread is 0.
     fn nuisance(&self, model: &Model, run: usize) -> Nuisance {
         let nuisance = self.nuisances[run].clone();
-        if model.spread.of[Spread::CLOCK] > 0.0 { nuisance } else { Nuisance { clock_s: 0.0, ..nuisance } }
+        if model.spread.has_clock() { nuisance } else { Nuisance { shares: nuisance.shares, ..Nuisance::default() } }
     }
 
     fn residuals_with(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Residuals, DiagnoseError> {
@@ -391,6 +411,21 @@ impl<'a> Estimator<'a> {
         Ok(short.into_iter().zip(whole).map(|(short, whole)| least.max(short).max(few * whole)).collect())
     }
 
+    /// All but the cache of predictions, for [`restore`](Self::restore).
+    pub fn state(&self) -> State {
+        State {
+            nuisances: self.nuisances.clone(),
+            used: self.used.clone(),
+            faults: self.faults.clone(),
+            noise: self.noise.clone(),
+        }
+    }
+
+    /// Restores a [`state`](Self::state).
+    pub fn restore(&mut self, State { nuisances, used, faults, noise }: State) {
+        (self.nuisances, self.used, self.faults, self.noise) = (nuisances, used, faults, noise);
+    }
+
     /// Sets the clock offset of each run to its estimate under `model`, and the columns of the bench's faults to the model's predictions.
     ///
     /// # Errors
@@ -401,12 +436,14 @@ impl<'a> Estimator<'a> {
         let plant = self.plant;
         for (run, faults) in self.faults_of(model)?.into_iter().enumerate() {
             let nuisance = &mut self.nuisances[run];
-            nuisance.clock_s = faults.first().copied().unwrap_or(0.0);
+            if let [clock, rate, ..] = faults[..] {
+                (nuisance.clock_s, nuisance.clock_rate) = (clock, rate);
+            }
             // The inputs beyond the last row are not known.
             let signal = &plant.signals()[run];
-            let end = signal.times.iter().copied().fold(0.0, f64::max) - nuisance.clock_s;
+            let end = signal.times.iter().copied().fold(0.0, f64::max);
             let counted = self.used[run].iter_mut().zip(&signal.times);
-            counted.filter(|(_, t)| **t > end + 1e-9).for_each(|(used, _)| *used = false);
+            counted.filter(|(_, t)| nuisance.time(**t) > end + 1e-9).for_each(|(used, _)| *used = false);
         }
         let columns = |run: usize| -> Result<Columns, DiagnoseError> {
             let signal = &plant.signals()[run];
@@ -418,7 +455,7 @@ impl<'a> Estimator<'a> {
             let rate: Vec<f64> = after.iter().zip(&*before).map(|(b, a)| (b - a) / (2.0 * HALF)).collect();
             let weights: Vec<f64> =
                 signal.sigmas.iter().zip(&self.used[run]).map(|(sigma, used)| if *used { 1.0 / sigma } else { 0.0 }).collect();
-            let clock = self.nuisances[run].clock_s;
+            let clock = [self.nuisances[run].clock_s, self.nuisances[run].clock_rate];
             let whiten = |column: &mut [f64]| self.noise.whiten(signal, &self.used[run], column);
             Ok(Columns::new(signal, [&now[..], &rate], &weights, clock, whiten))
         };
@@ -439,16 +476,32 @@ impl<'a> Estimator<'a> {
         (0..self.plant.signals().len()).into_par_iter().map(of).collect()
     }
 
+    /// The bench's faults of every run under `model` that are not off, with their standard deviations.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn found_faults(&self, model: &Model) -> Result<Vec<Vec<bench::Fault>>, DiagnoseError> {
+        let of = |run: usize| match self.faults.get(run) {
+            Some(columns) => Ok(columns.found(&model.spread, &self.misfit(model, run, &self.nuisance(model, run))?)),
+            None => Ok(Vec::new()),
+        };
+        (0..self.plant.signals().len()).into_par_iter().map(of).collect()
+    }
+
     /// The spread of the bench's faults that suits `model` on `runs` best.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn spread(&self, model: &Model, runs: &[usize]) -> Result<Spread, DiagnoseError> {
-        let with_clocks = runs.iter().filter_map(|run| Some((*run, self.faults.get(*run)?)));
-        let moments = with_clocks
+        let given = self.plant.bench();
+        if self.only_given_faults {
+            return Ok(Spread { of: given.map(|sd| sd.unwrap_or(0.0)) });
+        }
+        let with_columns = runs.iter().filter_map(|run| Some((*run, self.faults.get(*run)?)));
+        let moments = with_columns
             .map(|(run, columns)| Ok(columns.moments(&self.misfit(model, run, &self.nuisances[run])?)))
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
-        Ok(bench::spread(&moments, &self.plant.bench(), 1.0))
+        Ok(bench::spread(&moments, &given))
     }
 
     /// Masks single values whose residuals stand far above those around them in their channel, as after a tracker's slip, and returns their number.

@@ -17,6 +17,7 @@ pub mod dataset;
 pub mod diagnosis;
 mod error;
 pub mod extended;
+mod faults;
 pub mod fit;
 mod intervals;
 pub mod names;

@@ -225,15 +225,6 @@ impl Noise {
         (0..self.factors.len().max(other.factors.len())).any(level) || (self.correlated - other.correlated).abs() > LEAST_SHARE
     }
 
-    /// Values per independent one at an `interval` (s) of rows: 1 + 2 Σ ρ.
-    pub fn inflation(&self, interval: f64) -> f64 {
-        if self.correlated == 0.0 {
-            return 1.0;
-        }
-        let decay = (-interval / self.time_s).exp();
-        1.0 + 2.0 * self.correlated * decay / (1.0 - decay)
-    }
-
     /// Replaces residuals (σ, channel after channel, at `times` in s) by their innovations of unit variance; those that do not count are skipped.
     pub fn whiten(&self, signal: &Signal, used: &[bool], residuals: &mut [f64]) {
         if self.factors.is_empty() {
@@ -261,5 +252,80 @@ impl Noise {
             last = Some((channel, t, mean + gain * innovation, (1.0 - gain) * variance));
             *r = innovation / total.sqrt();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Normal numbers from a linear congruential generator.
+    fn normal(state: &mut u64) -> f64 {
+        let mut uniform = || {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let (a, b) = (uniform().max(1e-300), uniform());
+        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    }
+
+    /// Runs of a sine of 2, 5 and 12 Hz and a staircase, 2 s in rows of 2 ms, with residuals of `of(t, phase, state)` σ.
+    fn data(of: impl Fn(f64, f64, &mut u64, &mut f64) -> f64) -> (Vec<Signal>, Vec<Vec<bool>>, Vec<Vec<f64>>) {
+        let (mut signals, mut residuals) = (Vec::new(), Vec::new());
+        let mut state = 7;
+        for hertz in [2.0, 5.0, 12.0, 0.0] {
+            let (mut signal, mut r, mut memory) = (Signal::default(), Vec::new(), 0.0);
+            for row in 0..1000 {
+                let t = 0.002 * f64::from(row);
+                let phase = std::f64::consts::TAU * hertz * t;
+                signal.times.push(t);
+                signal.channels.push(0);
+                signal.values.push(0.0);
+                signal.inputs.push(if hertz == 0.0 { -300.0 * (2.0 * t).floor() } else { -500.0 * (1.0 - phase.cos()) });
+                r.push(of(t, phase, &mut state, &mut memory));
+            }
+            signals.push(signal);
+            residuals.push(r);
+        }
+        let used = vec![vec![true; 1000]; 4];
+        (signals, used, residuals)
+    }
+
+    #[test]
+    fn the_level_is_that_of_what_does_not_repeat() {
+        // A model error of 3 σ that follows the input, under noise of twice its stated size.
+        let (signals, used, residuals) = data(|_, phase, state, _| 3.0 * (2.0 * phase).sin() + 2.0 * normal(state));
+        let noise = estimate(&signals, &used, &residuals).unwrap();
+        assert!((noise.factors[0] - 2.0).abs() < 0.2 && noise.correlated == 0.0, "{noise:?}");
+        let white = Noise { factors: vec![1.0], ..Noise::default() };
+        assert!(noise.differs(&white) && !white.differs(&Noise::default()));
+    }
+
+    #[test]
+    fn correlated_noise_is_recovered_and_whitened() {
+        let time = 0.03;
+        let decay = f64::exp(-0.002 / time);
+        // Half and half, of unit variance.
+        let (signals, used, residuals) = data(|_, _, state, memory| {
+            *memory = decay * *memory + (1.0 - decay * decay).sqrt() * normal(state);
+            (*memory + normal(state)) / 2f64.sqrt()
+        });
+        let noise = estimate(&signals, &used, &residuals).unwrap();
+        // 4000 values at 31 rows per correlation time: some 5 % of error of the level, 30 % of the time.
+        assert!((noise.factors[0] - 1.0).abs() < 0.15, "{noise:?}");
+        assert!((0.3..0.7).contains(&noise.correlated) && (0.4..2.0).contains(&(noise.time_s / time)), "{noise:?}");
+        let exact = Noise { factors: vec![1.0], correlated: 0.5, time_s: time };
+        let mut white = residuals[0].clone();
+        exact.whiten(&signals[0], &used[0], &mut white);
+        let mean_square = white.iter().map(|r| r * r).sum::<f64>() / 1000.0;
+        let neighbours = white.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / 1000.0;
+        // Three standard errors of 1000 independent values.
+        assert!((mean_square - 1.0).abs() < 3.0 * 0.045 && neighbours.abs() < 3.0 * 0.032, "{mean_square} {neighbours}");
+    }
+
+    #[test]
+    fn a_hum_is_no_noise() {
+        let (signals, used, residuals) = data(|t, _, state, _| 2.5 * (std::f64::consts::TAU * 7.3 * t).sin() + normal(state));
+        assert_eq!(estimate(&signals, &used, &residuals), None);
     }
 }

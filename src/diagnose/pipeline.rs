@@ -3,10 +3,11 @@
 use super::DiagnoseError;
 use super::dataset::Role;
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
+use super::faults;
 use super::fit::{BLOCK, Estimator, Residuals};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
-use super::plant::{Model, Plant, Term};
+use super::plant::{Model, Plant, Signal, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
 use super::summary::{failing, summary};
@@ -24,6 +25,8 @@ const NOTHING_NAMED: f64 = 0.5;
 const NEAR_TIE: f64 = 500.0;
 /// 95 % quantiles of χ² of one to four degrees of freedom.
 const CHI2_95: [f64; 4] = [3.841, 5.991, 7.815, 9.488];
+/// A model selected without the bench's faults counts if its cost, with ln N for each coordinate, is lower by this.
+const LEAST_COST: f64 = 10.0;
 /// Fewest values to fit and to judge by, in whole blocks of correlated residuals.
 const LEAST_FITTED: usize = 2 * BLOCK;
 const LEAST_HELD: usize = BLOCK;
@@ -159,7 +162,13 @@ pub fn diagnose(
         rmse_heldout_mm: rmse(plant, &search.estimator.used, &trial.scored.plain, &search.split.held),
         delta_bic: trial.scored.bic() - calibrated.bic(),
     };
-    let sigmas: Vec<f64> = plant.signals().iter().flat_map(|signal| signal.sigmas.iter().copied()).collect();
+    let noise = &search.estimator.noise;
+    let factor = |channel: usize| noise.factors.get(channel).copied().unwrap_or(1.0);
+    let of = |signal: &Signal| -> Vec<f64> { signal.sigmas.iter().zip(&signal.channels).map(|(s, c)| s * factor(*c)).collect() };
+    let sigmas: Vec<f64> = plant.signals().iter().flat_map(of).collect();
+    let bench = faults::found(&search.estimator, best.model())?;
+    let mut quality = quality;
+    quality.extend(faults::remarks(&bench, noise, plant));
     let extended = stage(&best, parameters(&best, &intervals));
     let failed = failing(&extended.residual_tests);
     let diagnosis = Diagnosis {
@@ -179,6 +188,9 @@ pub fn diagnose(
         unexplained_fraction: if is_unexplained { unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
         unexplained,
         noise_mm: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64,
+        noise_correlated: noise.correlated,
+        noise_correlation_time_s: noise.time_s,
+        bench,
         baseline: stage(&nominal, Vec::new()),
         calibrated: stage(&calibrated, parameters(&calibrated, &constants)),
         extended,
@@ -316,8 +328,46 @@ struct Causes {
     spikes: usize,
 }
 
-/// Forward selection, backward elimination, replacement and the final refit; no causes where the data are insufficient.
+/// The causes, after the final refit; none where the data are insufficient.
+///
+/// A cause that differs from run to run, such as a gain that depends on the voltage, looks like a fault of the bench, and many small faults look like a
+/// cause. So where faults are estimated, causes are selected with and without them in the way, and the less costly model counts.
 fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
+    let before = (search.estimator.state(), search.split.clone());
+    let mut causes = select(search, calibrated, is_insufficient)?;
+    let cost = |causes: &Causes, search: &Search| {
+        let count = search.estimator.count(&search.split.all()) as f64;
+        causes.best.total() + causes.best.freedom() as f64 * count.ln()
+    };
+    search.estimator.only_given_faults = true;
+    let without = search.estimator.spread(calibrated.model(), &[])?;
+    if !is_insufficient && calibrated.model().spread != without {
+        (search.progress)("causes before faults of the bench");
+        let first = cost(&causes, search);
+        let after = (search.estimator.state(), search.split.clone());
+        search.estimator.restore(before.0);
+        search.split = before.1;
+        let plain = search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?;
+        let other = select(search, &plain, false)?;
+        if cost(&other, search) < first - LEAST_COST {
+            causes = other;
+        } else {
+            search.estimator.restore(after.0);
+            search.split = after.1;
+        }
+    }
+    search.estimator.only_given_faults = false;
+
+    (search.progress)("the final refit");
+    let mut best = search.fitted(&Model { fine: true, ..causes.best.model().clone() })?;
+    best = search.resolve(best)?;
+    best = search.backward(best)?;
+    causes.best = search.settle(best)?;
+    Ok(causes)
+}
+
+/// Forward selection, backward elimination and replacement; no causes where the data are insufficient.
+fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let (mut best, trials) = if is_insufficient {
         (search.fitted(&Model { terms: Vec::new(), ..calibrated.model().clone() })?, Vec::new())
     } else {
@@ -330,6 +380,10 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
     best = search.resolve(best)?;
     best = search.backward(best)?;
     best = search.resolve(best)?;
+    if std::mem::take(&mut search.estimator.only_given_faults) {
+        best = search.settle(best)?;
+        best = search.backward(best)?;
+    }
 
     let mut replaced: Vec<(usize, Trial)> = Vec::new();
     for _ in 0..2 {
@@ -354,11 +408,6 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
         best = search.settle(best)?;
     }
     let coarse_total = best.total();
-    (search.progress)("the final refit");
-    best = search.fitted(&Model { fine: true, ..best.model().clone() })?;
-    best = search.resolve(best)?;
-    best = search.backward(best)?;
-    best = search.settle(best)?;
     Ok(Causes { best, trials, replaced, coarse_total, spikes })
 }
 

@@ -67,8 +67,17 @@ pub struct Term {
 pub struct Nuisance {
     /// [`Plant::nuisances`] numbers between 0 and 1.
     pub shares: Vec<f64>,
-    /// Clock of the signals ahead of that of the inputs (s): a value at time t is predicted at t + this.
+    /// Clock of the signals ahead of that of the inputs (s): a value at time t is predicted at t (1 + `clock_rate`) + this.
     pub clock_s: f64,
+    /// Rate of the signals' clock over that of the inputs, less 1 (–).
+    pub clock_rate: f64,
+}
+
+impl Nuisance {
+    /// The time (s) at which a value at `t` (s) is predicted.
+    pub fn time(&self, t: f64) -> f64 {
+        t + self.clock_rate * t + self.clock_s
+    }
 }
 
 /// The nominal model with causes added, and its discretisation.
@@ -92,7 +101,7 @@ impl Model {
 }
 
 /// A measured run without missing and unusable values.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Signal {
     /// Its name.
     pub id: String,

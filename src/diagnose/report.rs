@@ -93,6 +93,7 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
     }
     ranking(&mut out, d, unit);
     parameters(&mut out, outcome, context);
+    bench(&mut out, d);
     tests(&mut out, d);
     out.push_str("<h2>Data quality</h2>\n");
     list(&mut out, &d.data_quality, "Nothing was noticed.");
@@ -322,6 +323,40 @@ fn tests(out: &mut String, d: &Diagnosis) {
         ]);
     }
     let _ = writeln!(out, "<details><summary>All statistics</summary>\n{}</details>", table.html());
+}
+
+fn bench(out: &mut String, d: &Diagnosis) {
+    if d.bench.is_empty() {
+        return;
+    }
+    out.push_str("<h2>Faults of the bench, run by run</h2>\n");
+    let mut table = Table::new(&["fault", "run", "channel", "#value", "#standard deviation", "unit"]);
+    for fault in &d.bench {
+        for run in &fault.runs {
+            table.row([
+                fault.id.into(),
+                run.run.as_str().into(),
+                run.channel.as_deref().unwrap_or("all").replace('_', " ").into(),
+                significant(run.value, 3).into(),
+                significant(run.sd, 2).into(),
+                fault.unit.as_str().into(),
+            ]);
+        }
+    }
+    let _ = writeln!(
+        out,
+        "<p>They are nuisance parameters with a normal prior and no causes. {}.</p><details><summary>All values</summary>\n{}</details>",
+        d.bench
+            .iter()
+            .map(|fault| {
+                let unit = if fault.unit.is_empty() { String::new() } else { format!(" {}", fault.unit) };
+                let by = if fault.given { "given" } else { "estimated" };
+                format!("Standard deviation between runs of the {}: {}{unit} ({by})", fault.id, significant(fault.spread, 2))
+            })
+            .collect::<Vec<_>>()
+            .join("; "),
+        table.html()
+    );
 }
 
 fn list(out: &mut String, lines: &[String], none: &str) {

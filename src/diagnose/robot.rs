@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::DiagnoseError;
+use super::bench;
 use super::candidates::candidates;
-use super::dataset::Dataset;
+use super::dataset::{Bench, Dataset};
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::track::{ON_STEP, track};
@@ -56,6 +57,7 @@ pub struct RobotPlant {
     /// Time step of each run (s).
     steps: Vec<f64>,
     candidates: Vec<Candidate>,
+    bench: Bench,
 }
 
 impl RobotPlant {
@@ -102,6 +104,7 @@ impl RobotPlant {
             durations: dataset.runs.iter().map(|run| run.times[run.times.len() - 1] - run.times[0]).collect(),
             steps,
             candidates,
+            bench: dataset.bench,
         };
         plant.with_chosen_steps()
     }
@@ -116,7 +119,7 @@ impl RobotPlant {
     fn longest_step(&self, run: usize) -> f64 {
         let finest = self.steps[run];
         let limit = 0.09 / (analytic::cantilever_frequency(&self.robot) * (self.robot.actuators as f64).powi(2));
-        let ends = Nuisance { shares: vec![1.0; self.nuisances(run)], clock_s: 0.0 };
+        let ends = Nuisance { shares: vec![1.0; self.nuisances(run)], ..Nuisance::default() };
         let with = |step: f64| self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok();
         let (Some(fine), Mount::Clamped) = (with(finest), self.robot.mount) else { return finest };
         let sigmas = &self.signals[run].sigmas;
@@ -240,6 +243,11 @@ impl Plant for RobotPlant {
         self.commands[run].jumps().len()
     }
 
+    fn bench(&self) -> [Option<f64>; bench::KINDS] {
+        let Bench { clock_ms, zero_mm, gain, drift_mm_per_s } = self.bench;
+        [clock_ms.map(|ms| 1e-3 * ms), None, gain, zero_mm, drift_mm_per_s]
+    }
+
     /// A constant counts only beyond the error of the discretisation: 1/(2m²) of the stiffness for m joints, six times that of the damping, and
     /// 0.5 % of the actuation gain, which does not depend on m.
     fn is_credible(&self, term: &Term, resolution: f64) -> bool {
@@ -300,7 +308,7 @@ impl RobotPlant {
         let mut times = signal.times.clone();
         times.sort_by(f64::total_cmp);
         times.dedup();
-        let seen: Vec<f64> = times.iter().map(|t| (t + nuisance.clock_s - view.delay).max(0.0)).collect();
+        let seen: Vec<f64> = times.iter().map(|t| (nuisance.time(*t) - view.delay).max(0.0)).collect();
         let tracks = track(&robot, 0.0, &drive, chain, step, &self.markers, &seen)?;
         let n = self.markers.len();
         let at = |(t, channel): (&f64, &usize)| {

@@ -1,7 +1,7 @@
 //! Keys of dataset files.
 
 use super::Default::{Else, Is, Needed};
-use super::Range::{Any, Positive};
+use super::Range::{Any, Between, Positive};
 use super::Value::{Name, Number, Other, Path, Text, Word};
 use super::{File, Key, Section, experiment, key};
 use crate::recording::definitions;
@@ -9,7 +9,7 @@ use crate::recording::definitions;
 pub(super) static FILE: File = File {
     name: "dataset",
     about: "Measured data: the robot, the tracked points, and a file per run or single numbers. `sfers diagnose` reads it.",
-    sections: &[DATASET, experiment::MATERIAL, experiment::ROBOT, experiment::FRICTION, MARKERS, NOISE, RUN, OBSERVATION],
+    sections: &[DATASET, experiment::MATERIAL, experiment::ROBOT, experiment::FRICTION, MARKERS, NOISE, BENCH, RUN, OBSERVATION],
 };
 
 pub(super) const DATASET: Section = Section {
@@ -35,6 +35,19 @@ const NOISE: Section = Section {
 
 pub(super) const DEFAULT_NOISE: Key =
     key("default_mm", Number(Positive), Else("estimated"), "of all markers without a value of their own");
+
+pub(super) const BENCH: Section = Section {
+    name: "bench",
+    heading: "[bench]",
+    about: "How much the bench differs from run to run, one standard deviation each. What is absent is estimated where the data ask for it; 0 means that \
+            it does not differ.",
+    keys: &[
+        key("clock_ms", Number(Between(0.0, 1e3)), Else("estimated"), "offset between the clocks of camera and voltage"),
+        key("zero_mm", Number(Between(0.0, 1e3)), Else("estimated"), "zero of every coordinate"),
+        key("gain", Number(Between(0.0, 1.0)), Else("estimated"), "gain of the motion, as a share"),
+        key("drift_mm_per_s", Number(Between(0.0, 1e3)), Else("estimated"), "drift of every coordinate"),
+    ],
+};
 
 pub(super) const RUN: Section = Section {
     name: "run",

@@ -96,6 +96,16 @@ impl Dataset {
                 return Err(wrong(&["noise", key], reason));
             }
         }
+        for (key, value, most) in description.bench.entries() {
+            if let Some(value) = value.filter(|value| !(0.0..=most).contains(value)) {
+                let reason = format!(
+                    "{key} is {}, but must be a standard deviation between 0 and {}; leave it out to have it estimated",
+                    words::number(value),
+                    words::number(most)
+                );
+                return Err(value_error(path, &text, &["bench", key], &format!("bench.{key}"), reason));
+            }
+        }
         for marker in &markers {
             let own = description.noise.get(&format!("{}_mm", marker.name)).or(description.noise.get("default_mm")).copied();
             noise.extend([own, own]);
@@ -135,7 +145,17 @@ impl Dataset {
         } else {
             description.dataset.name
         };
-        Ok(Self { name, about: description.dataset.about, nominal, robot, markers, noise, runs, observations })
+        Ok(Self {
+            name,
+            about: description.dataset.about,
+            nominal,
+            robot,
+            markers,
+            noise,
+            bench: description.bench,
+            runs,
+            observations,
+        })
     }
 }
 
