@@ -31,11 +31,14 @@ fn numbers<T: std::str::FromStr + Clone>(argument: Option<&String>, default: &[T
     argument.map_or(default.to_vec(), |list| list.split(',').filter_map(|item| item.parse().ok()).collect())
 }
 
-/// What was hidden: the effects, the trace (mm), and the true parameters with the effect's name, the parameter's and the value.
+/// True parameters of a hidden effect: its name, the parameter's, the value.
+type Truth = (String, &'static str, f64);
+
+/// What was hidden: the effects, the trace (mm), and the true parameters.
 struct Made {
     effects: Vec<String>,
     trace_mm: f64,
-    truths: Vec<(String, &'static str, f64)>,
+    truths: Vec<Truth>,
 }
 
 /// Writes the data of a case.
@@ -65,18 +68,12 @@ fn hide_on_the_floor(folder: &Path, (place, id): (&str, &str), size: usize, seed
     }
 }
 
-/// How many were as they should be, of how many.
+/// Answers of a family: how many were as they should be, in how many all causes were named, perhaps with others, and of how many.
 #[derive(Default)]
 struct Count {
     right: usize,
+    named: usize,
     of: usize,
-}
-
-impl Count {
-    fn add(&mut self, is_right: bool) {
-        self.right += usize::from(is_right);
-        self.of += 1;
-    }
 }
 
 /// The ids of the last argument.
@@ -100,6 +97,16 @@ fn said(d: &Diagnosis) -> String {
     physics(d).iter().map(of).collect::<Vec<_>>().join(" + ")
 }
 
+/// Whether the ranges of the parameters hold the true values, and words for it.
+fn inside(d: &Diagnosis, truths: &[Truth]) -> Vec<(bool, String)> {
+    let said = |(id, name, value): &Truth| {
+        let [low, high] = range(d, id, name)?;
+        let holds = (low..=high).contains(value);
+        Some((holds, if holds { "yes".into() } else { format!("no: {value:.4}, not {low:.4} to {high:.4}") }))
+    };
+    truths.iter().filter_map(said).collect()
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let sizes = numbers(arguments.get(1), &[0_usize, 1, 2]);
@@ -118,26 +125,25 @@ fn main() {
             }
         }
     }
-    let (mut total, mut ranges, mut families) = (Count::default(), Count::default(), BTreeMap::<String, Count>::new());
+    let (mut right, mut counted, mut inside_range, mut ranges) = (0, 0, 0, 0);
+    let mut families = BTreeMap::<String, Count>::new();
     for (id, size, seed, noise_mm) in all {
         let size = cases::read(id, seed).only_size.unwrap_or(size);
         let folder = tempfile::tempdir().expect("a folder for the data");
         let Made { effects, trace_mm, truths } = hide(folder.path(), id, size, seed, noise_mm);
         let d = diagnosed(folder.path()).diagnosis;
-        let inside: Vec<(bool, String)> = truths
-            .iter()
-            .filter_map(|(id, name, value)| {
-                let [low, high] = range(&d, id, name)?;
-                let holds = (low..=high).contains(value);
-                Some((holds, if holds { "yes".into() } else { format!("no: {value:.4}, not {low:.4} to {high:.4}") }))
-            })
-            .collect();
+        let inside = inside(&d, &truths);
         // A trace below three times the noise need not be found.
         if trace_mm >= 3.0 * noise_mm || effects.is_empty() {
             let is_right = is_expected(&d, &effects);
-            total.add(is_right);
-            families.entry(cases::family(id)).or_default().add(is_right);
-            inside.iter().for_each(|(holds, _)| ranges.add(*holds));
+            counted += 1;
+            right += usize::from(is_right);
+            ranges += inside.len();
+            inside_range += inside.iter().filter(|(holds, _)| *holds).count();
+            let family = families.entry(cases::family(id)).or_default();
+            family.right += usize::from(is_right);
+            family.named += usize::from(is_right || are_named(&d, &effects));
+            family.of += 1;
         }
         let drawn = if id.contains("several:") { format!(" ({})", effects.join("+")) } else { String::new() };
         println!(
@@ -150,13 +156,18 @@ fn main() {
         );
     }
     println!(
-        "\nAs it should be: {} of {} (where the trace is at least three times the noise); true value in its range: {} of {}.",
-        total.right, total.of, ranges.right, ranges.of
+        "\nAs it should be: {right} of {counted} (where the trace is at least three times the noise); true value in its range: {inside_range} of {ranges}."
     );
-    println!("\n| family | as it should be |\n| --- | --- |");
-    for (family, count) in families {
-        println!("| {family} | {} of {} |", count.right, count.of);
+    println!("\n| family | as it should be | all causes named, with others or alone |\n| --- | --- | --- |");
+    for (family, Count { right, named, of }) in families {
+        println!("| {family} | {right} of {of} | {named} of {of} |");
     }
+}
+
+/// True if there are causes, and all of them are named.
+fn are_named(d: &Diagnosis, effects: &[String]) -> bool {
+    let is_named = |id: &str| d.effects.iter().any(|effect| effect.id == id || effect.tied_with.iter().any(|tied| tied == id));
+    !effects.is_empty() && cases::named(effects).into_iter().all(is_named)
 }
 
 /// Nothing where nothing is hidden, `unexplained` of what is in no library, and otherwise every hidden cause by name.
@@ -165,10 +176,6 @@ fn is_expected(d: &Diagnosis, effects: &[String]) -> bool {
         [] => d.verdict == Verdict::None,
         [id] if OUTSIDE.contains(&id) => d.verdict == Verdict::Unexplained,
         [id] => is_right(d, id),
-        ref several => {
-            let is_named =
-                |id: &str| d.effects.iter().any(|effect| effect.id == id || effect.tied_with.iter().any(|tied| tied == id));
-            d.verdict != Verdict::Unexplained && several.iter().all(|id| is_named(id))
-        }
+        _ => d.verdict != Verdict::Unexplained && are_named(d, effects),
     }
 }

@@ -165,8 +165,8 @@ impl Drive {
     /// Other forms of the effects, one after the other.
     fn pass(&mut self, stages: &[Stage]) {
         for stage in stages {
-            let mut operator = stage.operator(self.first());
-            self.each(|v, dt| operator(v, dt));
+            let operator = stage.operator(self.first());
+            self.each(operator);
         }
     }
 
