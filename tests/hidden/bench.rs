@@ -1,8 +1,11 @@
 //! Faults of a bench, on top of whatever is hidden: its clock, its zero, its amplifier, its camera and what it says of its noise.
 
-use super::protocol::{RUNS, Run};
+use super::protocol::{RUNS, Run, Wave};
 use super::random::Random;
 use super::{Case, Markers};
+
+/// Rows per second of the logger of the voltage.
+const LOGGER_HZ: f64 = 480.0;
 
 /// Sizes of the faults; the default has none.
 #[derive(Clone)]
@@ -69,13 +72,24 @@ impl Bench {
         })
     }
 
-    /// Times of the rows of a run.
+    /// Times of the rows of a run: those of the frames, or of the logger where it is needed.
     pub fn times(&self, run: &Run) -> Vec<f64> {
         if self.frames_per_s <= 0.0 {
             return run.times();
         }
-        let frames = (run.duration * self.frames_per_s + 1e-6) as usize;
-        (0..=frames).map(|i| i as f64 / self.frames_per_s).collect()
+        let rate = self.frames_per_s * self.rows_per_frame(run) as f64;
+        let rows = (run.duration * rate + 1e-6) as usize;
+        (0..=rows).map(|i| i as f64 / rate).collect()
+    }
+
+    /// Rows of a run for each frame. A drive with fewer than twenty frames in a period is logged at 480 Hz, with empty cells between the frames:
+    /// the program refuses voltages in fewer rows.
+    pub fn rows_per_frame(&self, run: &Run) -> usize {
+        let hertz = match run.wave {
+            Wave::Sine { hertz, .. } | Wave::Square { hertz, .. } => hertz,
+            _ => 0.0,
+        };
+        if self.frames_per_s > 0.0 && 20.0 * hertz > self.frames_per_s { (LOGGER_HZ / self.frames_per_s) as usize } else { 1 }
     }
 
     /// Decimals of the times in the files.

@@ -149,7 +149,7 @@ pub fn write_on(folder: &Path, case: &Case, bench: &Bench) -> Truth {
             let (before, after) = seen.split_at_mut(half);
             after.iter_mut().for_each(|row| row[2..].copy_from_slice(&before[half - 1][2..]));
         }
-        let text = table(run, &times, bench.decimals(), &seen);
+        let text = table(run, &times, bench, &seen);
         std::fs::write(folder.join(format!("{}.csv", run.id)), text).expect("the CSV of a run");
     }
     Truth { hidden, trace_mm: trace(&markers, clean), motion_s: RUNS.iter().map(|run| run.duration).sum() }
@@ -248,10 +248,15 @@ fn photograph(rows: &mut Markers, case: &Case, random: &mut Random) {
     }
 }
 
-fn table(run: &Run, times: &[f64], decimals: usize, rows: &Markers) -> String {
+fn table(run: &Run, times: &[f64], bench: &Bench, rows: &Markers) -> String {
+    let (decimals, rows_per_frame) = (bench.decimals(), bench.rows_per_frame(run));
     let mut text = String::from("t_s,v1_v,mid_x_mm,mid_z_mm,tip_x_mm,tip_z_mm\n");
-    for (t, row) in times.iter().zip(rows) {
+    for (i, (t, row)) in times.iter().zip(rows).enumerate() {
         let [a, b, c, d] = row;
+        if i % rows_per_frame != 0 {
+            let _ = writeln!(text, "{t:.decimals$},{:.2},,,,", run.wave.volts(*t));
+            continue;
+        }
         let _ = writeln!(text, "{t:.decimals$},{:.2},{a:.3},{b:.3},{c:.3},{d:.3}", run.wave.volts(*t));
     }
     text
