@@ -5,6 +5,7 @@
 //! implicit Runge-Kutta method of Alexander with Newton's method on the accelerations of each stage.
 
 use super::effects::Nature;
+use super::moments::{MEMORY, Memory, Moment, Motion};
 use super::protocol::Drive;
 
 pub const LENGTH: f64 = 10.0;
@@ -31,6 +32,7 @@ pub struct Grid {
 
 type Vector = [f64; SIZE];
 type Branches = [[f64; BRANCHES.len()]; SIZE];
+type Memories = [Memory; SIZE];
 
 #[derive(Clone)]
 struct State {
@@ -38,6 +40,7 @@ struct State {
     rate: Vector,
     acceleration: Vector,
     branches: Branches,
+    memories: Memories,
 }
 
 struct Joint {
@@ -48,6 +51,8 @@ struct Joint {
     softening: f64,
     friction: f64,
     loss: f64,
+    pitch: f64,
+    other: Option<Moment>,
 }
 
 struct Rod {
@@ -81,7 +86,7 @@ impl<'a> Chain<'a> {
         let (mut rods, mut joints) = (Vec::new(), Vec::new());
         if soft_clamp {
             rods.push(Rod { length: 0.5 * pitch, mass: 0.5 * pitch * per_length });
-            joints.push(Joint::spring(1.0 / nature.clamp_rad_per_dyn_cm));
+            joints.push(Joint::spring(1.0 / nature.clamp_rad_per_dyn_cm, nature.other.clamp));
         }
         for i in 0..n {
             let length = if i + 1 == n { 0.5 * pitch } else { pitch };
@@ -155,7 +160,8 @@ impl<'a> Chain<'a> {
 
     fn settled(&self, volts: f64) -> State {
         let zero = [0.0; SIZE];
-        let mut state = State { angle: zero, rate: zero, acceleration: zero, branches: [[0.0; BRANCHES.len()]; SIZE] };
+        let (branches, memories) = ([[0.0; BRANCHES.len()]; SIZE], [[0.0; MEMORY]; SIZE]);
+        let mut state = State { angle: zero, rate: zero, acceleration: zero, branches, memories };
         for _ in 0..200 {
             let mut force = zero;
             let mut matrix = [[0.0; SIZE]; SIZE];
@@ -178,8 +184,10 @@ impl<'a> Chain<'a> {
         let nodes = [G, 0.5 * (1.0 + G), 1.0];
         let d = self.freedoms();
         let lossy = self.nature.loss > 0.0;
+        let remembers = self.nature.other.joint.is_some_and(|law| law.remembers());
         let (mut rates, mut accelerations) = ([[0.0; SIZE]; 2], [[0.0; SIZE]; 2]);
         let mut slopes = [[[0.0; BRANCHES.len()]; SIZE]; 2];
+        let mut changes = [[[0.0; MEMORY]; SIZE]; 2];
         let start = state.clone();
         for stage in 0..3 {
             let mut known = start.clone();
@@ -192,6 +200,9 @@ impl<'a> Chain<'a> {
                 if lossy {
                     add(&mut known.branches, weight, &slopes[j]);
                 }
+                if remembers {
+                    add(&mut known.memories, weight, &changes[j]);
+                }
             }
             known.acceleration = state.acceleration;
             let volts = drive.at(segment, time + nodes[stage] * h);
@@ -199,12 +210,19 @@ impl<'a> Chain<'a> {
             if lossy {
                 self.relax(state, &known, h * G);
             }
+            if remembers {
+                self.remember(state, &known, h * G);
+            }
             if stage < 2 {
                 rates[stage] = state.rate;
                 accelerations[stage] = state.acceleration;
                 if lossy {
                     add(&mut slopes[stage], 1.0 / (h * G), &state.branches);
                     add(&mut slopes[stage], -1.0 / (h * G), &known.branches);
+                }
+                if remembers {
+                    add(&mut changes[stage], 1.0 / (h * G), &state.memories);
+                    add(&mut changes[stage], -1.0 / (h * G), &known.memories);
                 }
             }
         }
@@ -243,6 +261,16 @@ impl<'a> Chain<'a> {
             let rate = state.rate[i] - if i > 0 { state.rate[i - 1] } else { 0.0 };
             for (b, time) in BRANCHES.iter().enumerate() {
                 state.branches[i][b] = (known.branches[i][b] + g * rate) / (1.0 + g / time);
+            }
+        }
+    }
+
+    /// The memories at the end of a stage.
+    fn remember(&self, state: &mut State, known: &State, g: f64) {
+        for i in 0..self.count() {
+            let speed = state.rate[i] - if i > 0 { state.rate[i - 1] } else { 0.0 };
+            if let Some(law) = &self.joints[i].other {
+                state.memories[i] = law.next(&known.memories[i], g, speed);
             }
         }
     }
@@ -290,7 +318,8 @@ impl<'a> Chain<'a> {
         for i in 0..n {
             force[i] += GRAVITY * angle[i].cos() * self.weight[i];
             let (bend, speed) = if i == 0 { (angle[0], rate[0]) } else { (angle[i] - angle[i - 1], rate[i] - rate[i - 1]) };
-            let torque = self.joints[i].torque(bend, speed, volts, known.map(|(k, g)| (&k.branches[i], g)));
+            let mut torque = self.joints[i].torque(bend, speed, volts, known.map(|(k, g)| (&k.branches[i], g)));
+            self.joints[i].add_other(&mut torque, bend, speed, volts, known.map(|(k, g)| (&k.memories[i], g)));
             let slope = scale[0] * torque.stiffness + scale[1] * torque.damping;
             force[i] += torque.value;
             matrix[i][i] += slope;
@@ -301,7 +330,7 @@ impl<'a> Chain<'a> {
                 matrix[i - 1][i] -= slope;
             }
         }
-        if self.nature.drag > 0.0 {
+        if self.nature.drag > 0.0 || self.nature.other.air.is_some() {
             self.add_drag(angle, rate, force);
         }
         self.add_cable(angle, rate, force);
@@ -316,7 +345,8 @@ impl<'a> Chain<'a> {
         const POINTS: [(f64, f64); 3] =
             [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
         let n = self.count();
-        let factor = 0.5 * AIR * self.nature.drag * WIDTH;
+        let (factor, other) = (0.5 * AIR * self.nature.drag * WIDTH, self.nature.other.air);
+        let mut arc = self.root;
         let mut origin = [0.0, if self.nature.fixture.is_some() { rate[n] } else { 0.0 }];
         let (mut totals, mut normals) = ([[0.0; 2]; SIZE], [[0.0; 2]; SIZE]);
         for i in 0..n {
@@ -326,12 +356,16 @@ impl<'a> Chain<'a> {
             let base = origin[0] * normal[0] + origin[1] * normal[1];
             for (place, weight) in POINTS {
                 let speed = base + place * length * rate[i];
-                let push = -factor * speed * speed.abs() * weight * length;
+                let mut push = -factor * speed * speed.abs() * weight * length;
+                if let Some(air) = &other {
+                    push -= 0.5 * AIR * WIDTH * air.drag(speed, arc + place * length) * weight * length;
+                }
                 force[i] += push * place * length;
                 totals[i][0] += push * normal[0];
                 totals[i][1] += push * normal[1];
             }
             normals[i] = normal;
+            arc += length;
             origin = [origin[0] + length * rate[i] * normal[0], origin[1] + length * rate[i] * normal[1]];
         }
         let mut beyond = [0.0; 2];
@@ -387,8 +421,8 @@ impl<'a> Chain<'a> {
 }
 
 impl Joint {
-    fn spring(stiffness: f64) -> Joint {
-        Joint { stiffness, damping: 0.0, gain: 0.0, rest: 0.0, softening: 0.0, friction: 0.0, loss: 0.0 }
+    fn spring(stiffness: f64, other: Option<Moment>) -> Joint {
+        Joint { stiffness, damping: 0.0, gain: 0.0, rest: 0.0, softening: 0.0, friction: 0.0, loss: 0.0, pitch: 1.0, other }
     }
 
     fn of_sheet(nature: &Nature, index: usize, n: usize) -> Joint {
@@ -405,6 +439,8 @@ impl Joint {
             softening: nature.softening_cm2 / (pitch * pitch),
             friction: nature.friction_dyn_cm,
             loss: nature.loss,
+            pitch,
+            other: nature.other.joint,
         }
     }
 
@@ -429,10 +465,20 @@ impl Joint {
         }
         Torque { value, stiffness: self.stiffness * bracket, damping }
     }
+
+    /// Adds another law, where there is one.
+    fn add_other(&self, torque: &mut Torque, bend: f64, speed: f64, volts: f64, before: Option<(&Memory, f64)>) {
+        let Some(law) = &self.other else { return };
+        let stretch = bend - self.gain * volts - self.rest;
+        let more = law.of(&Motion { stiffness: self.stiffness, pitch_cm: self.pitch, stretch, bend, speed, before });
+        torque.value += more.moment;
+        torque.stiffness += more.stiffness;
+        torque.damping += more.damping;
+    }
 }
 
-/// Adds a multiple of the branches of all joints.
-fn add(to: &mut Branches, factor: f64, from: &Branches) {
+/// Adds a multiple of the branches or memories of all joints.
+fn add<const N: usize>(to: &mut [[f64; N]; SIZE], factor: f64, from: &[[f64; N]; SIZE]) {
     to.iter_mut().flatten().zip(from.iter().flatten()).for_each(|(a, b)| *a += factor * b);
 }
 

@@ -2,6 +2,7 @@
 
 use super::Hidden;
 use super::chain::BRANCHES;
+use super::forms::Other;
 use super::protocol::{Creep, Plays, RUNS};
 use super::random::Random;
 
@@ -67,6 +68,8 @@ pub struct Nature {
     pub fixture: Option<Fixture>,
     pub hum: Option<Hum>,
     pub remanence: f64,
+    /// Effects by other equations.
+    pub other: Other,
 }
 
 impl Default for Nature {
@@ -102,6 +105,7 @@ impl Default for Nature {
             fixture: None,
             hum: None,
             remanence: 0.0,
+            other: Other::default(),
         }
     }
 }

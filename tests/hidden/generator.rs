@@ -8,19 +8,35 @@
 //! friction follows an arc tangent, drag is a quadrature along each rod, a saturating amplifier has a rounded knee, and the gain
 //! that grows with the field is smooth at zero. What they share is the physics: a wrong sign or factor shows as a misfit.
 //!
-//! `OUTSIDE` are effects that no entry of the program's library describes.
+//! `OUTSIDE` are effects that no entry of the program's library describes. forms.rs has three other equations for twelve of the effects, bench.rs
+//! faults of a bench that come on top of anything, cases.rs the ids of all that can be hidden.
 
 #![allow(dead_code)] // every test uses a part of it
 
+#[path = "bench.rs"]
+pub mod bench;
+#[path = "cases.rs"]
+pub mod cases;
 #[path = "chain.rs"]
 pub mod chain;
+#[path = "curves.rs"]
+pub mod curves;
 #[path = "effects.rs"]
 pub mod effects;
+#[path = "filters.rs"]
+pub mod filters;
+#[path = "forms.rs"]
+pub mod forms;
+#[path = "memories.rs"]
+pub mod memories;
+#[path = "moments.rs"]
+pub mod moments;
 #[path = "protocol.rs"]
 pub mod protocol;
 #[path = "../common/random.rs"]
 pub mod random;
 
+use bench::{Bench, Faults};
 use chain::{Chain, Grid};
 use effects::{Nature, hide};
 use protocol::{Drive, RUNS, Run};
@@ -93,7 +109,8 @@ const GRID: Grid = Grid { joints: 12, step: 2.5e-4 };
 
 /// Friction and a cable turn sharply: they need half the step.
 fn grid_for(nature: &Nature) -> Grid {
-    let sharp = nature.friction_dyn_cm > 0.0 || nature.cable.is_some();
+    let other = nature.other.joint.is_some_and(|law| law.is_sharp());
+    let sharp = nature.friction_dyn_cm > 0.0 || nature.cable.is_some() || other;
     Grid { step: if sharp { 0.5 * GRID.step } else { GRID.step }, ..GRID }
 }
 
@@ -102,27 +119,61 @@ pub type Markers = Vec<[f64; 4]>;
 
 /// Writes dataset.toml and the CSV files of a case.
 pub fn write(folder: &Path, case: &Case) -> Truth {
+    write_on(folder, case, &Bench::default())
+}
+
+/// The same on a bench with faults, which do not count as trace.
+pub fn write_on(folder: &Path, case: &Case, bench: &Bench) -> Truth {
     let mut nature = Nature::default();
     let chosen = case.effects.iter().filter(|id| **id != "none");
-    let known = |id: &&str| *INSIDE.iter().chain(OUTSIDE).find(|k| *k == id).unwrap_or_else(|| panic!("no effect {id}"));
-    let hidden: Vec<Hidden> = chosen.map(|id| hide(known(id), case.size, case.seed, &mut nature)).collect();
+    let hidden: Vec<Hidden> = chosen.map(|id| hide_any(id, case, &mut nature)).collect();
     let clean = nominal();
-    let markers = if hidden.is_empty() { clean.clone() } else { simulate(&nature, grid_for(&nature)) };
+    let grid = grid_for(&nature);
+    let markers = if hidden.is_empty() { clean.clone() } else { simulate(&nature, grid) };
+    let faults = Faults::draw(bench, case.seed);
+    let films = if bench.films_anew() { films_on(&nature, grid, bench, &faults) } else { markers.clone() };
     std::fs::create_dir_all(folder).expect("the folder of the dataset");
-    std::fs::write(folder.join("dataset.toml"), description(case)).expect("dataset.toml");
+    std::fs::write(folder.join("dataset.toml"), description(case, bench)).expect("dataset.toml");
     let mut random = Random::with_purpose(case.seed, "camera");
     let damaged = case.damaged.then(|| random.below(RUNS.len()));
-    for (i, run) in RUNS.iter().enumerate() {
-        let mut seen = markers[i].clone();
-        photograph(&mut seen, case, &mut random);
+    for (i, (run, mut seen)) in RUNS.iter().zip(films).enumerate() {
+        let times = bench.times(run);
+        faults[i].shift(&mut seen, &times);
+        if bench.correlation_s > 0.0 {
+            bench::add_correlated_noise(&mut seen, &times, case, bench.correlation_s, &mut random);
+        } else {
+            photograph(&mut seen, case, &mut random);
+        }
         if damaged == Some(i) {
             let half = seen.len() / 2;
             let (before, after) = seen.split_at_mut(half);
             after.iter_mut().for_each(|row| row[2..].copy_from_slice(&before[half - 1][2..]));
         }
-        std::fs::write(folder.join(format!("{}.csv", run.id)), table(run, &seen)).expect("the CSV of a run");
+        let text = table(run, &times, bench, &seen);
+        std::fs::write(folder.join(format!("{}.csv", run.id)), text).expect("the CSV of a run");
     }
     Truth { hidden, trace_mm: trace(&markers, clean), motion_s: RUNS.iter().map(|run| run.duration).sum() }
+}
+
+/// Hides an effect or another form of one.
+fn hide_any(id: &str, case: &Case, nature: &mut Nature) -> Hidden {
+    if let Some(form) = forms::find(id) {
+        return forms::hide(form, case.size, case.seed, nature);
+    }
+    let known = INSIDE.iter().chain(OUTSIDE).find(|known| **known == id).unwrap_or_else(|| panic!("no effect {id}"));
+    hide(known, case.size, case.seed, nature)
+}
+
+/// The markers of every run as a bench with faults of clock, gain and frames films them. Runs go on a little for a clock that is ahead.
+fn films_on(nature: &Nature, grid: Grid, bench: &Bench, faults: &[Faults]) -> Vec<Markers> {
+    const MORE_S: f64 = 0.05;
+    let film = |(index, run): (usize, &Run)| {
+        let mut nature = nature.clone();
+        nature.run_gains[index] *= faults[index].gain;
+        let longer = Run { id: run.id, interval: run.interval, duration: run.duration + MORE_S, wave: run.wave };
+        film_at(&nature, grid, index, &longer, &bench.times(run), faults[index].clock_s.clamp(-MORE_S, MORE_S))
+    };
+    RUNS.iter().enumerate().map(film).collect()
 }
 
 /// The markers when nothing is hidden.
@@ -145,9 +196,13 @@ pub fn trace(a: &[Markers], b: &[Markers]) -> f64 {
 
 /// One run as the camera would see it without noise.
 fn film(nature: &Nature, grid: Grid, index: usize, run: &Run) -> Markers {
+    film_at(nature, grid, index, run, &run.times(), 0.0)
+}
+
+/// The same at given times of a clock that is late.
+fn film_at(nature: &Nature, grid: Grid, index: usize, run: &Run, times: &[f64], late_s: f64) -> Markers {
     let drive = Drive::of(run, nature, nature.run_gains[index]);
-    let times = run.times();
-    let moments: Vec<f64> = times.iter().map(|t| t - nature.sensor_delay_s).collect();
+    let moments: Vec<f64> = times.iter().map(|t| t - nature.sensor_delay_s - late_s).collect();
     let chain = Chain::new(nature, grid);
     let mut film = Vec::with_capacity(times.len());
     match nature.slips[index] {
@@ -160,7 +215,7 @@ fn film(nature: &Nature, grid: Grid, index: usize, run: &Run) -> Markers {
             film[after..].copy_from_slice(&slipped[after..]);
         }
     }
-    film.iter_mut().zip(&times).for_each(|(row, t)| distort(row, nature, index, *t));
+    film.iter_mut().zip(times).for_each(|(row, t)| distort(row, nature, index, *t));
     film
 }
 
@@ -193,24 +248,32 @@ fn photograph(rows: &mut Markers, case: &Case, random: &mut Random) {
     }
 }
 
-fn table(run: &Run, rows: &Markers) -> String {
+fn table(run: &Run, times: &[f64], bench: &Bench, rows: &Markers) -> String {
+    let (decimals, rows_per_frame) = (bench.decimals(), bench.rows_per_frame(run));
     let mut text = String::from("t_s,v1_v,mid_x_mm,mid_z_mm,tip_x_mm,tip_z_mm\n");
-    for (t, row) in run.times().iter().zip(rows) {
+    for (i, (t, row)) in times.iter().zip(rows).enumerate() {
         let [a, b, c, d] = row;
-        let _ = writeln!(text, "{t:.4},{:.2},{a:.3},{b:.3},{c:.3},{d:.3}", run.wave.volts(*t));
+        if i % rows_per_frame != 0 {
+            let _ = writeln!(text, "{t:.decimals$},{:.2},,,,", run.wave.volts(*t));
+            continue;
+        }
+        let _ = writeln!(text, "{t:.decimals$},{:.2},{a:.3},{b:.3},{c:.3},{d:.3}", run.wave.volts(*t));
     }
     text
 }
 
-fn description(case: &Case) -> String {
+fn description(case: &Case, bench: &Bench) -> String {
     let mut text = format!(
         "[dataset]\nname = \"case\"\nabout = \"single-actuator cantilever, tip and mid markers from a camera\"\n\n\
          [material]\npreset = \"parameter-2\"\n\n\
          [robot]\nactuators = 1\nmotors_per_actuator = {}\nmount = \"clamped\"\ndamping_eta = 0.008\n\n\
-         [markers]           # distance from the clamped end along the robot, mm\nmid = 50.0\ntip = 100.0\n\n\
-         [noise]             # one standard deviation, mm\ndefault_mm = {}\n",
-        case.m, case.noise_mm
+         [markers]           # distance from the clamped end along the robot, mm\nmid = 50.0\ntip = 100.0\n",
+        case.m
     );
+    if let Some(factor) = bench.stated_noise {
+        let stated = factor * case.noise_mm;
+        let _ = write!(text, "\n[noise]             # one standard deviation, mm\ndefault_mm = {stated}\n");
+    }
     for run in &RUNS {
         let _ = write!(text, "\n[[run]]\nid = \"{0}\"\nfile = \"{0}.csv\"\n", run.id);
     }

@@ -1,6 +1,7 @@
 //! The runs of the bench, and the way from the voltage commanded to the voltage that bends the sheet.
 
 use super::effects::{Nature, RADII};
+use super::forms::Stage;
 
 /// Longest interval between the points of a drive, s.
 const FINE: f64 = 1e-4;
@@ -119,6 +120,7 @@ impl Drive {
         drive.map(|v| soft_max(nature.low_v, v));
         drive.slew(nature.slew_v_per_s);
         drive.lag(nature.lag_s);
+        drive.pass(&nature.other.driver);
         let first = drive.first();
         let mut plays = Plays::new(nature.hysteresis, first);
         drive.each(|v, _| plays.follow(v));
@@ -130,6 +132,7 @@ impl Drive {
             v + nature.remanence * lowest
         });
         drive.map(|v| v * (1.0 + nature.slope_per_v * (v.hypot(15.0) - 15.0)));
+        drive.pass(&nature.other.actuation);
         drive.map(|v| gain * if v > 0.0 { nature.ratio * v } else { v });
         drive
     }
@@ -156,6 +159,14 @@ impl Drive {
             for (i, value) in segment.volts.iter_mut().enumerate() {
                 *value = change(*value, if i > 0 { segment.interval } else { 0.0 });
             }
+        }
+    }
+
+    /// Other forms of the effects, one after the other.
+    fn pass(&mut self, stages: &[Stage]) {
+        for stage in stages {
+            let operator = stage.operator(self.first());
+            self.each(operator);
         }
     }
 
@@ -194,7 +205,7 @@ impl Drive {
 }
 
 /// First-order response after `dt` to an input that goes evenly from `before` to `after`.
-fn follow(state: f64, before: f64, after: f64, dt: f64, time: f64) -> f64 {
+pub fn follow(state: f64, before: f64, after: f64, dt: f64, time: f64) -> f64 {
     if dt <= 0.0 {
         return state;
     }

@@ -1,0 +1,68 @@
+//! Other curves from voltage to voltage: gains that follow the field, polarity and amplifiers that saturate softly.
+//!
+//! Each function takes the size of the form and the first voltage of a run, and makes an operator of `(voltage, time since the one before)`.
+
+/// Turns voltages into voltages, in order of time (V, s).
+pub type Operator = Box<dyn FnMut(f64, f64) -> f64>;
+
+fn curve(change: impl Fn(f64) -> f64 + 'static) -> Operator {
+    Box::new(move |v, _| change(v))
+}
+
+/// `ln(1 + exp(x))` without overflow.
+fn softplus(x: f64) -> f64 {
+    if x > 30.0 { x } else { x.exp().ln_1p() }
+}
+
+/// The charge constant goes from one plateau to another about 1 kV/mm, 500 V: Smart Material data sheet of the MFC (400 and 460 pm/V).
+pub fn plateaus(share: f64, _: f64) -> Operator {
+    curve(move |v| v * (1.0 + 0.5 * share * (1.0 + ((v.abs() - 500.0) / 160.0).tanh())))
+}
+
+/// The strain is a power of the field; for the nonlinear strain of soft ceramics see Hall, J. Mater. Sci. 36 (2001) 4575.
+pub fn power_law(exponent: f64, _: f64) -> Operator {
+    curve(move |v| v * (v.abs() / 700.0).powf(exponent))
+}
+
+/// Growth with the square of the field that levels off as a rational function.
+pub fn rational_growth(share: f64, _: f64) -> Operator {
+    curve(move |v| v * (1.0 + share * v * v / (v * v + 640_000.0)))
+}
+
+/// The gain of positive voltages sets in over 60 V instead of at once.
+pub fn smooth_polarity(excess: f64, _: f64) -> Operator {
+    curve(move |v| v * (1.0 + 0.5 * excess * (1.0 + (v / 60.0).tanh())))
+}
+
+/// The gain of positive voltages grows with them, as on the way to depoling (Damjanovic, Rep. Prog. Phys. 61 (1998) 1267).
+pub fn growing_polarity(excess: f64, _: f64) -> Operator {
+    curve(move |v| if v > 0.0 { v * (1.0 + excess * v / 300.0) } else { v })
+}
+
+/// Positive voltages act only beyond a dead zone, rounded over 8 V.
+pub fn dead_zone(volts: f64, _: f64) -> Operator {
+    const ROUND: f64 = 8.0;
+    let passed = move |v: f64| ROUND * (softplus((v - volts) / ROUND) - softplus(-volts / ROUND));
+    curve(move |v| if v > 0.0 { passed(v) } else { v })
+}
+
+/// Straight up to 0.6 of the limit, then a hyperbolic tangent towards it: soft clipping.
+pub fn tanh_limit(limit: f64, _: f64) -> Operator {
+    let (knee, rest) = (0.6 * limit, 0.4 * limit);
+    curve(move |v| if -v > knee { -knee - rest * ((-v - knee) / rest).tanh() } else { v })
+}
+
+/// A parabola from 300 V before the limit to 300 V behind it.
+pub fn parabolic_limit(limit: f64, _: f64) -> Operator {
+    const HALF: f64 = 300.0;
+    curve(move |v| {
+        let inside = -v - (limit - HALF);
+        if inside <= 0.0 {
+            v
+        } else if inside < 2.0 * HALF {
+            v + inside * inside / (4.0 * HALF)
+        } else {
+            -limit
+        }
+    })
+}

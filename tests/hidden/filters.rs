@@ -1,0 +1,100 @@
+//! Other filters between the commanded voltage and that at the electrodes: lags, limits of the rate, and a limit of the level with memory.
+
+use super::curves::Operator;
+use super::protocol::follow;
+
+/// Steps into which an interval of the drive is cut where a filter has no closed solution.
+const PARTS: usize = 10;
+
+/// Calls `step` with the voltage in the middle of each part of an interval, and the part's length.
+fn in_parts(before: f64, after: f64, dt: f64, mut step: impl FnMut(f64, f64)) {
+    if dt > 0.0 {
+        for part in 0..PARTS {
+            step(before + (after - before) * (part as f64 + 0.5) / PARTS as f64, dt / PARTS as f64);
+        }
+    }
+}
+
+/// An amplifier of second order with the damping ratio 0.7 (a power stage behind an inductor); the size is its delay of slow signals, s.
+pub fn second_order(delay: f64, first: f64) -> Operator {
+    const RATIO: f64 = 0.7;
+    let pulse = 2.0 * RATIO / delay;
+    let (mut now, mut rate, mut before) = (first, 0.0, first);
+    Box::new(move |v, dt| {
+        in_parts(before, v, dt, |middle, part| {
+            // The trapezoidal rule, solved for the new rate.
+            let pull = pulse * pulse * (middle - now) - 2.0 * RATIO * pulse * rate;
+            let stiff = 1.0 + RATIO * pulse * part + 0.25 * pulse * pulse * part * part;
+            let change = part * (pull - 0.5 * part * pulse * pulse * rate) / stiff;
+            now += part * (rate + 0.5 * change);
+            rate += change;
+        });
+        before = v;
+        now
+    })
+}
+
+/// Charging through one resistor and discharging through another of three times the size (a driver with a bleeder).
+pub fn two_resistors(time: f64, first: f64) -> Operator {
+    let (mut now, mut before) = (first, first);
+    Box::new(move |v, dt| {
+        in_parts(before, v, dt, |middle, part| {
+            let is_charging = (middle - now) * now >= 0.0;
+            now = follow(now, middle, middle, part, if is_charging { time } else { 3.0 * time });
+        });
+        before = v;
+        now
+    })
+}
+
+/// Two RC stages in a row, of unlike times: a filter before the amplifier and the capacitance behind it.
+pub fn cascade(time: f64, first: f64) -> Operator {
+    let (mut middle, mut now, mut before) = (first, first, first);
+    Box::new(move |v, dt| {
+        let was = middle;
+        middle = follow(middle, before, v, dt, time);
+        now = follow(now, was, middle, dt, 0.4 * time);
+        before = v;
+        now
+    })
+}
+
+/// The current of a differential pair, a hyperbolic tangent of its input (Gray and Meyer), charges the load; the size is the limit in V/s.
+pub fn tanh_rate(limit: f64, first: f64) -> Operator {
+    const TIME: f64 = 1e-4;
+    let (mut now, mut before) = (first, first);
+    Box::new(move |v, dt| {
+        in_parts(before, v, dt, |middle, part| now += part * limit * ((middle - now) / (limit * TIME)).tanh());
+        before = v;
+        now
+    })
+}
+
+/// The rate towards negative voltages is limited to the size, that back to 2.5 times as much: unlike sources and sinks.
+pub fn unequal_rates(limit: f64, first: f64) -> Operator {
+    let mut now = first;
+    Box::new(move |v, dt| {
+        now += (v - now).clamp(-limit * dt, 2.5 * limit * dt);
+        now
+    })
+}
+
+/// The limit of the current droops as the voltage rises: a converter of constant power.
+pub fn drooping_rate(limit: f64, first: f64) -> Operator {
+    let mut now = first;
+    Box::new(move |v, dt| {
+        let most = limit * (1.0 - now.abs() / 2200.0).max(0.1) * dt;
+        now += (v - now).clamp(-most, most);
+        now
+    })
+}
+
+/// The supply sags under load and recovers in 0.15 s: the limit falls by up to 15 % with the mean of the output.
+pub fn sagging_supply(limit: f64, first: f64) -> Operator {
+    let mut load = (first.abs() / limit).min(1.0);
+    Box::new(move |v, dt| {
+        let now = v.max(-limit * (1.0 - 0.15 * load));
+        load = follow(load, now.abs() / limit, now.abs() / limit, dt, 0.15);
+        now
+    })
+}
