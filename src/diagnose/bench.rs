@@ -1,4 +1,5 @@
-//! Faults of the bench: a clock offset and rate, a gain, and a zero and a linear drift of each channel, run by run.
+//! Faults of the bench: a clock offset and rate, a gain of the inputs, a scale of the signals, and a zero and a linear drift of each channel, run by
+//! run.
 //!
 //! They are nuisance parameters u of a run with normal priors, u ~ N(0, S), and enter its residuals r (σ) linearly through the columns G (values ×
 //! faults, σ per unit of u). They are eliminated from every prediction by generalised least squares (variable projection):
@@ -23,12 +24,15 @@ const TRIALS: usize = 40;
 const MOST_PASSES: usize = 6;
 
 /// Kinds of faults, in the order of their columns.
-pub const KINDS: usize = 5;
+pub const KINDS: usize = 6;
+/// Kinds in which predictions are not linear: clock offset, clock rate and gain. Their columns belong to a base value of each run.
+pub const BASED: usize = 3;
 
 /// Standard deviation of each kind of fault between runs; 0 is off.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
-    /// Of the clock (s), its rate (–), the gain (–), zeros (unit of the signals) and drifts (per second).
+    /// Of the clock (s), its rate (–), the gain of the inputs (–), the scale of the signals (–), zeros (unit of the signals) and drifts (per
+    /// second).
     pub of: [f64; KINDS],
 }
 
@@ -37,21 +41,23 @@ impl Spread {
     pub const CLOCK: usize = 0;
     /// Rates of the clock.
     pub const RATE: usize = 1;
-    /// Gains.
+    /// Gains of the inputs.
     pub const GAIN: usize = 2;
+    /// Scales of the signals.
+    pub const SCALE: usize = 3;
     /// Zeros of the channels.
-    pub const ZERO: usize = 3;
+    pub const ZERO: usize = 4;
     /// Drifts of the channels.
-    pub const DRIFT: usize = 4;
+    pub const DRIFT: usize = 5;
 
     /// True if all faults are off.
     pub fn is_off(&self) -> bool {
         self.of.iter().all(|sd| *sd == 0.0)
     }
 
-    /// True if clocks differ.
-    pub fn has_clock(&self) -> bool {
-        self.of[Self::CLOCK] > 0.0 || self.of[Self::RATE] > 0.0
+    /// The base values of the kinds that are on; 0 for the others.
+    pub fn keep(&self, base: [f64; BASED]) -> [f64; BASED] {
+        std::array::from_fn(|kind| if self.of[kind] > 0.0 { base[kind] } else { 0.0 })
     }
 
     /// Standard deviation of every column of a run of a number of `channels`.
@@ -61,7 +67,7 @@ impl Spread {
 }
 
 /// Columns of a run for all channels, before those for each.
-const SHARED: usize = 3;
+const SHARED: usize = 4;
 
 /// Kind of a column.
 fn kind(column: usize, channels: usize) -> usize {
@@ -82,8 +88,8 @@ pub struct Columns {
     gram: DMatrix<f64>,
     /// Number of channels.
     channels: usize,
-    /// Clock offset (s) and rate (–) at which residuals are computed.
-    clock: [f64; 2],
+    /// Base values at which residuals are computed.
+    base: [f64; BASED],
 }
 
 /// A fault of a run.
@@ -108,13 +114,13 @@ pub struct Moments<'a> {
 }
 
 impl Columns {
-    /// Columns of a run at a clock offset (s) and rate (–): `predicted` values and their derivative by time, `rate`; 1/σ of each value, 0 for those that do not
+    /// Columns of a run at base values: `predicted` values and their derivatives by time, `rate`, and by the gain; 1/σ of each value, 0 for those that do not
     /// count; `whiten` replaces residuals (σ) by independent ones.
     pub fn new(
         signal: &Signal,
-        [predicted, rate]: [&[f64]; 2],
+        [predicted, rate, by_gain]: [&[f64]; 3],
         weights: &[f64],
-        clock: [f64; 2],
+        base: [f64; BASED],
         whiten: impl Fn(&mut [f64]),
     ) -> Self {
         let (channels, times) = (&signal.channels, &signal.times);
@@ -127,7 +133,8 @@ impl Columns {
             let rest = *first[channel].get_or_insert(predicted[i]);
             columns[Spread::CLOCK][i] = weight * rate[i];
             columns[Spread::RATE][i] = weight * rate[i] * times[i];
-            columns[Spread::GAIN][i] = weight * (predicted[i] - rest);
+            columns[Spread::GAIN][i] = weight * by_gain[i];
+            columns[Spread::SCALE][i] = weight * (predicted[i] - rest);
             columns[SHARED + channel][i] = *weight;
             columns[SHARED + count + channel][i] = weight * (times[i] - middle);
         }
@@ -135,13 +142,13 @@ impl Columns {
         columns.iter_mut().for_each(|column| whiten(column));
         let q = columns.len();
         let gram = DMatrix::from_fn(q, q, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
-        Self { plain, columns, gram, channels: count, clock }
+        Self { plain, columns, gram, channels: count, base }
     }
 
-    /// Residuals about a clock without offset and rate, to first order.
-    fn about_zero(&self, residuals: &mut [f64]) {
-        for (clock, column) in self.clock.iter().zip(&self.columns).filter(|(clock, _)| **clock != 0.0) {
-            residuals.iter_mut().zip(column).for_each(|(r, g)| *r += clock * g);
+    /// Residuals at the base values `base` as those about 0, to first order.
+    fn about_zero(&self, base: [f64; BASED], residuals: &mut [f64]) {
+        for (base, column) in base.iter().zip(&self.columns).filter(|(base, _)| **base != 0.0) {
+            residuals.iter_mut().zip(column).for_each(|(r, g)| *r += base * g);
         }
     }
 
@@ -168,9 +175,7 @@ impl Columns {
     /// The faults of a run with the given residuals (σ): the clock offset (s), the gain, zeros and drifts.
     pub fn faults(&self, spread: &Spread, residuals: &[f64]) -> Vec<f64> {
         let mut residuals = residuals.to_vec();
-        if spread.has_clock() {
-            self.about_zero(&mut residuals);
-        }
+        self.about_zero(spread.keep(self.base), &mut residuals);
         self.estimate(spread, &self.along(&residuals)).0
     }
 
@@ -196,9 +201,7 @@ impl Columns {
             residuals.resize(residuals.len() + self.columns.len(), 0.0);
             return 0.0;
         }
-        if spread.has_clock() {
-            self.about_zero(residuals);
-        }
+        self.about_zero(spread.keep(self.base), residuals);
         let (faults, log_det) = self.estimate(spread, &self.along(residuals));
         for (fault, column) in faults.iter().zip(&self.columns).filter(|(fault, _)| **fault != 0.0) {
             residuals.iter_mut().zip(column).for_each(|(r, g)| *r -= fault * g);
@@ -214,9 +217,7 @@ impl Columns {
             return;
         }
         let mut faults = self.faults(spread, whitened);
-        if spread.has_clock() {
-            faults.iter_mut().zip(self.clock).for_each(|(fault, clock)| *fault -= clock);
-        }
+        faults.iter_mut().zip(spread.keep(self.base)).for_each(|(fault, base)| *fault -= base);
         for (fault, column) in faults.iter().zip(&self.plain).filter(|(fault, _)| **fault != 0.0) {
             plain.iter_mut().zip(column).for_each(|(r, g)| *r -= fault * g);
         }
@@ -225,7 +226,7 @@ impl Columns {
     /// What the run, with the given residuals (σ), contributes to the likelihood.
     pub fn moments(&self, residuals: &[f64]) -> Moments<'_> {
         let mut residuals = residuals.to_vec();
-        self.about_zero(&mut residuals);
+        self.about_zero(self.base, &mut residuals);
         Moments { gram: &self.gram, along: self.along(&residuals), channels: self.channels }
     }
 }
@@ -341,13 +342,19 @@ mod tests {
 
     fn columns(hertz: f64) -> Columns {
         let (signal, predicted, rate) = run(hertz);
-        Columns::new(&signal, [&predicted, &rate], &vec![1.0 / SIGMA; 1000], [0.0; 2], |_| {})
+        Columns::new(
+            &signal,
+            [&predicted, &rate, &predicted.iter().map(|f| 1.1 * f).collect::<Vec<_>>()],
+            &vec![1.0 / SIGMA; 1000],
+            [0.0; BASED],
+            |_| {},
+        )
     }
 
     #[test]
     fn eliminated_residuals_have_the_generalised_least_squares_cost() {
         let own = columns(3.0);
-        let spread = Spread { of: [2e-3, 0.0, 0.01, 0.1, 0.0] };
+        let spread = Spread { of: [2e-3, 0.0, 0.01, 0.0, 0.1, 0.0] };
         let mut random = noise(1);
         let r: Vec<f64> = (0..1000).map(|_| random()).collect();
         let mut eliminated = r.clone();
@@ -387,7 +394,7 @@ mod tests {
         for seed in 1..=20 {
             assert!(found([0.0; KINDS], [0.0; KINDS], seed).is_off(), "seed {seed}");
         }
-        let true_sds = [4e-3, 0.0, 0.01, 0.2, 0.0];
+        let true_sds = [4e-3, 0.0, 0.0, 0.01, 0.2, 0.0];
         for seed in 1..=5 {
             let sds = found(true_sds, [0.0; KINDS], seed).of;
             for (sd, truth) in sds.iter().zip(true_sds) {
@@ -399,9 +406,9 @@ mod tests {
 
     #[test]
     fn what_all_runs_share_is_left_to_the_causes_but_for_the_rate_of_the_clock() {
-        let common = [1e-3, 0.0, 0.02, 0.3, 0.0];
+        let common = [1e-3, 0.0, 0.0, 0.02, 0.3, 0.0];
         assert!(found([0.0; KINDS], common, 3).is_off());
-        let rate = found([0.0; KINDS], [0.0, 2e-3, 0.0, 0.0, 0.0], 3).of;
+        let rate = found([0.0; KINDS], [0.0, 2e-3, 0.0, 0.0, 0.0, 0.0], 3).of;
         assert!((1e-3..4e-3).contains(&rate[Spread::RATE]) && rate[Spread::CLOCK] == 0.0, "{rate:?}");
     }
 }

@@ -123,7 +123,7 @@ pub struct RunFault {
 /// A fault of the bench that differs from run to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BenchFault {
-    /// `clock offset`, `clock rate`, `gain`, `zero` or `drift`.
+    /// `clock offset`, `clock rate`, `gain` of the inputs, `scale` of the signals, `zero` or `drift`.
     pub id: &'static str,
     /// Unit of the values; empty for shares.
     pub unit: String,

@@ -39,7 +39,7 @@ impl Files {
 
 /// The experiment file (TOML) of a model under the drive of a run, and the file of that drive, `drive.csv`. `nuisances` (0 to 1) are the run's.
 pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usize, nuisances: &[f64]) -> (String, String) {
-    let table = plant.command(run).table(nuisances);
+    let table = plant.command(run).table(nuisances, 0.0);
     let n = plant.robot().actuators;
     let names = std::iter::once("t_s".to_owned()).chain((1..=n).map(|a| format!("v{a}_v"))).collect();
     let rows = table.times().iter().enumerate();

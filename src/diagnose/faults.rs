@@ -9,8 +9,14 @@ use super::plant::{Model, Plant};
 use crate::number::significant;
 
 /// Name of each kind, its unit if that is not the plant's, and the factor from the unit of the estimate.
-const NAMES: [(&str, &str, f64); KINDS] =
-    [("clock offset", "ms", 1e3), ("clock rate", "", 1.0), ("gain", "", 1.0), ("zero", "*", 1.0), ("drift", "*/s", 1.0)];
+const NAMES: [(&str, &str, f64); KINDS] = [
+    ("clock offset", "ms", 1e3),
+    ("clock rate", "", 1.0),
+    ("gain", "", 1.0),
+    ("scale", "", 1.0),
+    ("zero", "*", 1.0),
+    ("drift", "*/s", 1.0),
+];
 
 /// The faults of the bench under `model` that are not off.
 pub(super) fn found(estimator: &Estimator, model: &Model) -> Result<Vec<BenchFault>, DiagnoseError> {
@@ -51,6 +57,7 @@ pub(super) fn remarks(bench: &[BenchFault], noise: &Noise, plant: &dyn Plant) ->
                 "clock offset" => "clocks differ",
                 "clock rate" => "the clock of the rows and that of the voltages run at rates that differ",
                 "gain" => "gains differ",
+                "scale" => "scales of the picture differ",
                 "zero" => "zeros differ",
                 _ => "drifts differ",
             };

@@ -116,7 +116,7 @@ fn key(model: &Model, run: usize, nuisance: &Nuisance) -> Vec<u64> {
         [term.candidate as u64, term.x.len() as u64].into_iter().chain(numbers)
     });
     let whole = [run as u64, model.resolution.to_bits(), u64::from(model.fine)];
-    let nuisance = nuisance.shares.iter().chain([&nuisance.clock_s, &nuisance.clock_rate]);
+    let nuisance = nuisance.shares.iter().chain(&nuisance.base);
     whole.into_iter().chain(terms).chain(nuisance.map(|x| x.to_bits())).collect()
 }
 
@@ -163,8 +163,8 @@ impl<'a> Estimator<'a> {
 
     /// The nuisance parameters of a run in a model: without clock offsets where their spread is 0.
     fn nuisance(&self, model: &Model, run: usize) -> Nuisance {
-        let nuisance = self.nuisances[run].clone();
-        if model.spread.has_clock() { nuisance } else { Nuisance { shares: nuisance.shares, ..Nuisance::default() } }
+        let Nuisance { shares, base } = self.nuisances[run].clone();
+        Nuisance { shares, base: model.spread.keep(base) }
     }
 
     fn residuals_with(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Residuals, DiagnoseError> {
@@ -426,19 +426,18 @@ impl<'a> Estimator<'a> {
         (self.nuisances, self.used, self.faults, self.noise) = (nuisances, used, faults, noise);
     }
 
-    /// Sets the clock offset of each run to its estimate under `model`, and the columns of the bench's faults to the model's predictions.
+    /// Sets the base values of each run's faults to their estimates under `model`, and their columns to the model's predictions there.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn set_faults(&mut self, model: &Model) -> Result<(), DiagnoseError> {
-        // Half of a central difference (s).
-        const HALF: f64 = 1e-4;
+        // Halves of central differences, in s and in the gain.
+        const HALF_STEP: f64 = 1e-4;
+        const HALF_GAIN: f64 = 5e-3;
         let plant = self.plant;
         for (run, faults) in self.faults_of(model)?.into_iter().enumerate() {
             let nuisance = &mut self.nuisances[run];
-            if let [clock, rate, ..] = faults[..] {
-                (nuisance.clock_s, nuisance.clock_rate) = (clock, rate);
-            }
+            nuisance.base = faults.first_chunk().copied().unwrap_or_default();
             // The inputs beyond the last row are not known.
             let signal = &plant.signals()[run];
             let end = signal.times.iter().copied().fold(0.0, f64::max);
@@ -447,17 +446,23 @@ impl<'a> Estimator<'a> {
         }
         let columns = |run: usize| -> Result<Columns, DiagnoseError> {
             let signal = &plant.signals()[run];
-            let at = |by: f64| {
-                let nuisance = &self.nuisances[run];
-                self.predict(model, run, &Nuisance { clock_s: nuisance.clock_s + by, ..nuisance.clone() })
+            let nuisance = &self.nuisances[run];
+            let at = |kind: usize, by: f64| {
+                let mut moved = nuisance.clone();
+                moved.base[kind] += by;
+                self.predict(model, run, &moved)
             };
-            let (before, now, after) = (at(-HALF)?, at(0.0)?, at(HALF)?);
-            let rate: Vec<f64> = after.iter().zip(&*before).map(|(b, a)| (b - a) / (2.0 * HALF)).collect();
+            let derivative = |kind: usize, half: f64| -> Result<Vec<f64>, DiagnoseError> {
+                let (before, after) = (at(kind, -half)?, at(kind, half)?);
+                Ok(after.iter().zip(&*before).map(|(b, a)| (b - a) / (2.0 * half)).collect())
+            };
+            let now = self.predict(model, run, nuisance)?;
+            let rate = derivative(Spread::CLOCK, HALF_STEP)?;
+            let by_gain = derivative(Spread::GAIN, HALF_GAIN)?;
             let weights: Vec<f64> =
                 signal.sigmas.iter().zip(&self.used[run]).map(|(sigma, used)| if *used { 1.0 / sigma } else { 0.0 }).collect();
-            let clock = [self.nuisances[run].clock_s, self.nuisances[run].clock_rate];
             let whiten = |column: &mut [f64]| self.noise.whiten(signal, &self.used[run], column);
-            Ok(Columns::new(signal, [&now[..], &rate], &weights, clock, whiten))
+            Ok(Columns::new(signal, [&now[..], &rate, &by_gain], &weights, nuisance.base, whiten))
         };
         let columns: Vec<Columns> = (0..plant.signals().len()).into_par_iter().map(columns).collect::<Result<_, _>>()?;
         self.faults = columns;

@@ -14,8 +14,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::plant::Signal;
 
-/// Harmonics that are removed where the input is periodic.
+/// Most harmonics that are removed where the input is periodic, and least number of values for each coefficient.
 const HARMONICS: usize = 10;
+const VALUES_PER_COEFFICIENT: usize = 8;
 /// Least number of periods and of values in a stretch.
 const LEAST_PERIODS: f64 = 4.0;
 const LEAST_VALUES: usize = 25;
@@ -103,7 +104,8 @@ fn without_trend(times: &[f64], values: &[f64], period: Option<f64>) -> Option<(
     let length = times[n - 1] - from;
     // No harmonics beyond half of the rows' rate.
     let rate = (n - 1) as f64 / length;
-    let harmonics = period.map_or(0, |period| HARMONICS.min((0.5 * rate * period) as usize));
+    let most = HARMONICS.min(n / VALUES_PER_COEFFICIENT / 2);
+    let harmonics = period.map_or(0, |period| most.min((0.5 * rate * period) as usize));
     let columns = 2 + 2 * harmonics;
     if n < columns + LEAST_VALUES / 2 {
         return None;
@@ -166,7 +168,10 @@ fn low_quantile<'a>(rests: impl Iterator<Item = &'a Rest>) -> Option<f64> {
 pub fn estimate(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) -> Option<Noise> {
     let rests = rests(signals, used, residuals);
     let channels = signals.iter().flat_map(|signal| signal.channels.iter()).max()? + 1;
-    let levels: Vec<Option<f64>> = (0..channels).map(|c| low_quantile(rests.iter().filter(|rest| rest.channel == c))).collect();
+    let levels_of = |rests: &[Rest]| -> Vec<Option<f64>> {
+        (0..channels).map(|c| low_quantile(rests.iter().filter(|rest| rest.channel == c))).collect()
+    };
+    let levels = levels_of(&rests);
     // Channels without enough values have the others' mean factor.
     let known: Vec<f64> = levels.iter().flatten().copied().collect();
     let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
@@ -175,6 +180,19 @@ pub fn estimate(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) 
     }
     let typical: Vec<&Rest> = rests.iter().filter(|rest| variance(rest) <= 2.0 * levels[rest.channel].unwrap_or(mean)).collect();
     let (correlated, time_s) = correlation(&typical)?;
+    if correlated == 0.0 {
+        return Some(Noise { factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(), correlated, time_s });
+    }
+    // Trends take more of correlated noise than their number of coefficients: the level is that of the innovations, which are white.
+    let white: Vec<Rest> = rests
+        .iter()
+        .map(|rest| {
+            let mut filter = Filter::new(correlated, time_s);
+            let values = rest.values.iter().enumerate().map(|(k, r)| filter.innovation(k as f64 * rest.interval, *r));
+            Rest { values: values.collect(), ..*rest }
+        })
+        .collect();
+    let levels = levels_of(&white);
     Some(Noise { factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(), correlated, time_s })
 }
 
@@ -200,17 +218,28 @@ fn correlation(rests: &[&Rest]) -> Option<(f64, f64)> {
     if bins.values().any(|[sum, weight]| sum / weight < LEAST_CORRELATION) {
         return None;
     }
+    // Removing trends lowers all autocorrelations alike, nearly: an offset is fitted beside the share.
     let mut best = (0.0, 0.0, 0.0);
     for k in 0..40 {
         let time = 1e-3 * 10f64.powf(k as f64 / 13.0);
-        let (mut ab, mut bb) = (0.0, 0.0);
+        let mut sums = [0.0; 5];
         for [lag, value, weight] in &points {
             let model = (-lag / time).exp();
-            ab += weight * value * model;
-            bb += weight * model * model;
+            for (sum, term) in sums.iter_mut().zip([1.0, model, model * model, *value, value * model]) {
+                *sum += weight * term;
+            }
         }
-        if bb > 0.0 && ab > 0.0 && ab * ab / bb > best.0 {
-            best = (ab * ab / bb, (ab / bb).min(1.0), time);
+        let [one, m, mm, v, vm] = sums;
+        let (variance, covariance) = (mm - m * m / one, vm - v * m / one);
+        let share = (covariance / variance).min(1.0);
+        let offset = (v - share * m) / one;
+        let (share, fall) = if offset < 0.0 && variance > 0.0 {
+            (share, covariance * covariance / variance + v * v / one)
+        } else {
+            (vm / mm, vm * vm / mm)
+        };
+        if share > 0.0 && fall > best.0 {
+            best = (fall, share.min(1.0), time);
         }
     }
     let (_, share, time) = best;
@@ -230,28 +259,48 @@ impl Noise {
         if self.factors.is_empty() {
             return;
         }
-        let white = 1.0 - self.correlated;
-        // Channel, time, mean and variance of the correlated part after the last row.
-        let mut last: Option<(usize, f64, f64, f64)> = None;
+        let (mut filter, mut before) = (Filter::new(self.correlated, self.time_s), None);
         for (i, r) in residuals.iter_mut().enumerate().take(signal.values.len()) {
             let (channel, t) = (signal.channels[i], signal.times[i]);
             *r /= self.factors[channel];
             if self.correlated == 0.0 || !used[i] {
                 continue;
             }
-            let (mean, variance) = match last {
-                Some((before, at, mean, variance)) if before == channel => {
-                    let decay = (-(t - at) / self.time_s).exp();
-                    (decay * mean, decay * decay * variance + (1.0 - decay * decay) * self.correlated)
-                }
-                _ => (0.0, self.correlated),
-            };
-            let innovation = *r - mean;
-            let total = variance + white;
-            let gain = variance / total;
-            last = Some((channel, t, mean + gain * innovation, (1.0 - gain) * variance));
-            *r = innovation / total.sqrt();
+            if before.replace(channel) != Some(channel) {
+                filter = Filter::new(self.correlated, self.time_s);
+            }
+            *r = filter.innovation(t, *r);
         }
+    }
+}
+
+/// The Kalman filter of noise of unit variance.
+struct Filter {
+    correlated: f64,
+    time_s: f64,
+    /// Time (s) of the last value, mean and variance of the correlated part after it.
+    last: Option<[f64; 3]>,
+}
+
+impl Filter {
+    fn new(correlated: f64, time_s: f64) -> Self {
+        Self { correlated, time_s, last: None }
+    }
+
+    /// The innovation of a value at `t` (s), of unit variance.
+    fn innovation(&mut self, t: f64, value: f64) -> f64 {
+        let (mean, variance) = match self.last {
+            Some([at, mean, variance]) => {
+                let decay = (-(t - at) / self.time_s).exp();
+                (decay * mean, decay * decay * variance + (1.0 - decay * decay) * self.correlated)
+            }
+            None => (0.0, self.correlated),
+        };
+        let innovation = value - mean;
+        let total = variance + 1.0 - self.correlated;
+        let gain = variance / total;
+        self.last = Some([t, mean + gain * innovation, (1.0 - gain) * variance]);
+        innovation / total.sqrt()
     }
 }
 

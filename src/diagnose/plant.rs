@@ -67,16 +67,15 @@ pub struct Term {
 pub struct Nuisance {
     /// [`Plant::nuisances`] numbers between 0 and 1.
     pub shares: Vec<f64>,
-    /// Clock of the signals ahead of that of the inputs (s): a value at time t is predicted at t (1 + `clock_rate`) + this.
-    pub clock_s: f64,
-    /// Rate of the signals' clock over that of the inputs, less 1 (–).
-    pub clock_rate: f64,
+    /// Clock of the signals ahead of that of the inputs (s), rate of the signals' clock over that of the inputs, less 1 (–), and gain of the inputs,
+    /// less 1 (–): the kinds of [`bench::BASED`].
+    pub base: [f64; bench::BASED],
 }
 
 impl Nuisance {
     /// The time (s) at which a value at `t` (s) is predicted.
     pub fn time(&self, t: f64) -> f64 {
-        t + self.clock_rate * t + self.clock_s
+        t + self.base[Spread::RATE] * t + self.base[Spread::CLOCK]
     }
 }
 
@@ -151,8 +150,8 @@ pub trait Plant: Sync {
         true
     }
 
-    /// The values that `model` predicts for `run`, in the order and unit of [`Signal::values`]. A plant that does not know its inputs between the
-    /// rows may ignore the clock: clock offsets are then no nuisance parameters.
+    /// The values that `model` predicts for `run`, in the order and unit of [`Signal::values`]. What a plant ignores of
+    /// [`Nuisance::base`], such as clocks where the inputs are not known between the rows, is no nuisance parameter of its runs.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated; [`DiagnoseError::Plant`] takes any error or text.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::bench;
+use super::bench::{self, Spread};
 use super::candidates::candidates;
 use super::dataset::{Bench, Dataset};
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
@@ -245,7 +245,8 @@ impl Plant for RobotPlant {
 
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         let Bench { clock_ms, zero_mm, gain, drift_mm_per_s } = self.bench;
-        [clock_ms.map(|ms| 1e-3 * ms), None, gain, zero_mm, drift_mm_per_s]
+        // A given gain is that of the voltage; the camera's scale then has none of its own.
+        [clock_ms.map(|ms| 1e-3 * ms), None, gain, gain.map(|_| 0.0), zero_mm, drift_mm_per_s]
     }
 
     /// A constant counts only beyond the error of the discretisation: 1/(2m²) of the stiffness for m joints, six times that of the damping, and
@@ -300,7 +301,7 @@ impl RobotPlant {
         nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let table = self.commands[run].table(&nuisance.shares);
+        let table = self.commands[run].table(&nuisance.shares, nuisance.base[Spread::GAIN]);
         let Setup { robot, drive, chain, view } =
             self.setup(self.robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];

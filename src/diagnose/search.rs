@@ -788,7 +788,12 @@ mod tests {
             &self.candidates
         }
 
-        fn predict(&self, model: &Model, run: usize, _nuisance: &crate::diagnose::plant::Nuisance) -> Result<Vec<f64>, DiagnoseError> {
+        fn predict(
+            &self,
+            model: &Model,
+            run: usize,
+            _nuisance: &crate::diagnose::plant::Nuisance,
+        ) -> Result<Vec<f64>, DiagnoseError> {
             let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
             Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
         }

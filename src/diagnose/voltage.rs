@@ -56,8 +56,8 @@ impl Command {
         [self.times[row], self.times[row + 1]]
     }
 
-    /// The interpolated command, with each jump after the given share (0 to 1) of its interval.
-    pub fn table(&self, shares: &[f64]) -> Table {
+    /// The interpolated command times 1 + `gain`, with each jump after the given share (0 to 1) of its interval.
+    pub fn table(&self, shares: &[f64], gain: f64) -> Table {
         let (mut times, mut volts) = (Vec::new(), Vec::new());
         let mut first = 0;
         let ends = self.jumps.iter().copied().chain([self.times.len() - 1]);
@@ -76,6 +76,9 @@ impl Command {
             }
             self.smooth(first, last, &mut times, &mut volts);
             first = last + 1;
+        }
+        if gain != 0.0 {
+            volts.iter_mut().for_each(|v| *v *= 1.0 + gain);
         }
         Table::new(times, volts, self.actuators).unwrap_or_else(|_| {
             // Rows closer than a jump's width: the rows without it rise.
@@ -274,7 +277,7 @@ mod tests {
         let v = |t: f64| -750.0 * (1.0 - (2.0 * PI * 25.0 * t).cos());
         let command = sampled(200, 2e-3, v);
         assert!(command.jumps().is_empty());
-        let table = command.table(&[]);
+        let table = command.table(&[], 0.0);
         for i in 0..3900 {
             let t = i as f64 * 1e-4;
             // Straight lines between rows would be off by 9 V. Near the start the spline's end condition costs more.
@@ -329,7 +332,7 @@ mod tests {
         let v = |t: f64| 975.0 * (1.0 - (t - 1.0).abs());
         let command = sampled(101, 0.02, v);
         assert!(command.jumps().is_empty());
-        let table = command.table(&[]);
+        let table = command.table(&[], 0.0);
         for i in 0..2000 {
             let t = i as f64 * 1e-3;
             assert!((at(&table, t) - v(t)).abs() < 0.01, "{t}");
@@ -341,7 +344,7 @@ mod tests {
         let command = sampled(20, 0.01, |t| if t < 0.095 { 0.0 } else { -900.0 });
         assert_eq!(command.jumps(), [9]);
         for share in [0.0, 0.3, 1.0] {
-            let table = command.table(&[share]);
+            let table = command.table(&[share], 0.0);
             let moment = 0.09 + 0.01 * share;
             assert_eq!((at(&table, moment - 1e-5), at(&table, moment + 1e-5)), (0.0, -900.0), "{share}");
         }

@@ -107,7 +107,7 @@ pub fn give_dataset(input: &Input, folder: &Path, _: &mut Random) -> Outcome {
     }
     for run in &dataset.runs {
         let command = Command::new(&run.times, &run.voltages, dataset.robot.actuators);
-        let table = command.table(&vec![0.5; command.jumps().len()]);
+        let table = command.table(&vec![0.5; command.jumps().len()], 0.0);
         outputs::finite("command", table.times())?;
         (0..table.times().len()).try_for_each(|row| outputs::finite("command", table.row(row)))?;
     }
