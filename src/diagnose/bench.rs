@@ -15,8 +15,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::plant::Signal;
 
-/// A fault stays off unless the cost falls by this, once in some thousand data sets by chance (half of χ² with one degree of freedom).
+/// A fault stays off unless the cost falls by this, once in some thousand data sets by chance (half of χ² with one degree of freedom), ...
 const LEAST_FALL: f64 = 12.0;
+/// ... and by this share of the number of values, a misfit of σ/3 (rms): less is model error that small faults would take from its cause.
+const LEAST_SHARE: f64 = 0.1;
 /// Trial standard deviations of a fault: from the error with which a run determines it, in this ratio, this many.
 const RATIO: f64 = 1.333_521_432_163_324; // 10^(1/8)
 const TRIALS: usize = 40;
@@ -111,6 +113,8 @@ pub struct Moments<'a> {
     /// Gᵀ r.
     along: DVector<f64>,
     channels: usize,
+    /// Number of values.
+    count: usize,
 }
 
 impl Columns {
@@ -227,7 +231,7 @@ impl Columns {
     pub fn moments(&self, residuals: &[f64]) -> Moments<'_> {
         let mut residuals = residuals.to_vec();
         self.about_zero(self.base, &mut residuals);
-        Moments { gram: &self.gram, along: self.along(&residuals), channels: self.channels }
+        Moments { gram: &self.gram, along: self.along(&residuals), channels: self.channels, count: residuals.len() }
     }
 }
 
@@ -279,6 +283,7 @@ pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
         sizes.get(sizes.len() / 2).map(|size| size.sqrt().recip())
     });
     let least: Vec<Option<f64>> = least.collect();
+    let least_fall = LEAST_FALL.max(LEAST_SHARE * runs.iter().map(|run| run.count as f64).sum::<f64>());
     let mut now = cost(runs, &spread);
     for _ in 0..MOST_PASSES {
         let before = spread;
@@ -293,7 +298,7 @@ pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
             let best = (0..TRIALS)
                 .map(|k| at(least * RATIO.powi(k as i32)))
                 .min_by(|a, b| a.1.total_cmp(&b.1))
-                .filter(|best| best.1 < off.1 - LEAST_FALL)
+                .filter(|best| best.1 < off.1 - least_fall)
                 .unwrap_or(off);
             (spread, now) = best;
         }

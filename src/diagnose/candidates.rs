@@ -60,19 +60,19 @@ pub(super) fn candidates(robot: &Robot, markers: usize) -> Vec<Candidate> {
             "driver-lag" => vec![one("time_constant_s", 2e-3, &[1e-3, 5e-3])],
             "hysteresis" => vec![
                 (
-                    vec![("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3), ("gain", 0.1)],
-                    vec![vec![0.05, 0.2, 0.0, 1.0], vec![0.2, 0.6, 0.0, 1.0]],
-                    vec![("exponent", 1.0), ("plays", 0.0)],
+                    vec![("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3)],
+                    vec![vec![0.05, 0.2, 0.0], vec![0.2, 0.6, 0.0]],
+                    vec![("exponent", 1.0), ("plays", 0.0), ("pinned", 1.0)],
                 ),
                 (
-                    vec![("width", 0.05), ("shape", 0.5), ("gain", 0.1), ("decay_per_kv", 2.0)],
-                    vec![vec![0.05, 0.0, 1.0, 1.0], vec![0.2, 0.5, 1.0, 1.0]],
-                    vec![("plays", 1.0), ("from_zero", 0.0)],
+                    vec![("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                    vec![vec![0.05, 0.0, 1.0], vec![0.2, 0.5, 1.0]],
+                    vec![("plays", 1.0), ("from_zero", 0.0), ("pinned", 1.0)],
                 ),
                 (
-                    vec![("width", 0.05), ("shape", 0.5), ("gain", 0.1), ("decay_per_kv", 2.0)],
-                    vec![vec![0.05, 0.0, 1.0, 1.0]],
-                    vec![("plays", 1.0), ("from_zero", 1.0)],
+                    vec![("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                    vec![vec![0.05, 0.0, 1.0]],
+                    vec![("plays", 1.0), ("from_zero", 1.0), ("pinned", 1.0)],
                 ),
             ],
             "creep" => {

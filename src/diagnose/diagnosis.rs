@@ -33,6 +33,16 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
+/// What an adopted cause counts for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    /// A cause of the misfit.
+    Cause,
+    /// One of those that together remove the last 2 % of the misfit, or one that removes less than half the noise: every bench leaves such a rest.
+    Minor,
+}
+
 /// An adopted cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adopted {
@@ -46,6 +56,10 @@ pub struct Adopted {
     pub parameters: Vec<Estimate>,
     /// Causes that the data cannot tell from it.
     pub tied_with: Vec<String>,
+    /// Share of the misfit of the refined, re-tuned nominal model that comes back without it (0 to 1).
+    pub share: f64,
+    /// What it counts for.
+    pub role: Part,
     /// Share of the held-out χ² above the noise that it removes (0 to 1).
     pub gain_heldout: f64,
     /// Parameters that were given: name and value.

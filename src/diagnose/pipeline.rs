@@ -2,9 +2,9 @@
 
 use super::DiagnoseError;
 use super::dataset::Role;
-use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Part, Ranked, RunError, Stage, Verdict};
 use super::faults;
-use super::fit::{BLOCK, Estimator, Residuals};
+use super::fit::{BLOCK, Estimator, Residuals, sum_of_squares};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Signal, Term};
@@ -19,6 +19,10 @@ const LEFT_OVER: f64 = 0.25;
 /// ... and by this share of what the refined nominal model leaves: true causes with other equations than the library's leave 0.6 % at most. For n
 /// causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
 const LEFT_SHARE: f64 = 0.02;
+/// Causes are minor that together remove no more than this share, ...
+const MINOR_SHARE: f64 = 0.02;
+/// ... and those that remove less than this of χ² per value: half the noise.
+const MINOR_MISFIT: f64 = 0.25;
 /// No cause is named if a larger share is left.
 const NOTHING_NAMED: f64 = 0.5;
 /// Replacements are refitted like the best model if their χ² exceeds its own by no more than this.
@@ -115,16 +119,18 @@ pub fn diagnose(
     if refined {
         effects.push(discretisation(&search, &best, &coarse));
     }
+    let whole = whole_misfit(&search, &best, &bare)?;
     for (index, term) in best.model().terms.iter().enumerate() {
         effects.push(adopted(&search, &best, index, term, &intervals, &tied)?);
     }
-    let physics = best.model().terms.len();
+    set_roles(&mut effects, whole);
+    let physics = effects.iter().filter(|effect| effect.role == Part::Cause && effect.id != "discretisation").count();
     let insufficient = insufficient.or_else(|| if physics == 0 { doubts.first().cloned() } else { None });
     let verdict = match () {
         () if is_unexplained => Verdict::Unexplained,
         () if physics == 0 && insufficient.is_some() && above(&best) > LEFT_OVER => Verdict::Unexplained,
         () if physics == 0 => Verdict::None,
-        () if effects.iter().any(|effect| !effect.tied_with.is_empty()) => Verdict::Tied,
+        () if effects.iter().any(|effect| effect.role == Part::Cause && !effect.tied_with.is_empty()) => Verdict::Tied,
         () => Verdict::Named,
     };
     if let Some(insufficient) = insufficient.as_ref().filter(|insufficient| !remarks.contains(insufficient)) {
@@ -341,7 +347,7 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
     };
     search.estimator.only_given_faults = true;
     let without = search.estimator.spread(calibrated.model(), &[])?;
-    if !is_insufficient && calibrated.model().spread != without {
+    if !is_insufficient && causes.best.model().spread != without {
         (search.progress)("causes before faults of the bench");
         let first = cost(&causes, search);
         let after = (search.estimator.state(), search.split.clone());
@@ -496,9 +502,54 @@ fn adopted(
         cause: candidate.cause.to_owned(),
         parameters: which.chain(estimates(search, index, term, found)).collect(),
         tied_with,
+        share: (chi2(&without) - chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64,
+        role: Part::Cause,
         gain_heldout: gain(search, best, &without),
         fixed: form.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
     })
+}
+
+/// χ² of all runs.
+fn chi2(scored: &Scored) -> f64 {
+    scored.residuals.iter().map(|r| sum_of_squares(r)).sum()
+}
+
+/// χ² per value that all causes together remove from the refined nominal model: with re-tuned constants, or as it is where these are the causes.
+fn whole_misfit(search: &Search, best: &Scored, bare: &Scored) -> Result<f64, DiagnoseError> {
+    let count = search.estimator.count(&search.split.all()) as f64;
+    let is_constant = |term: &Term| search.estimator.plant.candidates()[term.candidate].is_constant;
+    if best.model().terms.iter().any(is_constant) {
+        return Ok((chi2(bare) - chi2(best)) / count);
+    }
+    let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
+    Ok((chi2(&search.fitted_at_its_spread(&tuned)?) - chi2(best)) / count)
+}
+
+/// Sets the roles of causes, and their shares of `whole`, both χ² per value at first.
+fn set_roles(effects: &mut [Adopted], whole: f64) {
+    let own: Vec<f64> = effects.iter().map(|effect| effect.share).collect();
+    for effect in effects.iter_mut() {
+        effect.share = if whole > 0.0 { (effect.share / whole).min(1.0) } else { 0.0 };
+    }
+    let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
+    order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
+    let mut sum = 0.0;
+    // What slope of a loop is called its gain is a convention: within the opening of the loop a gain is no cause of its own.
+    let value = |id: &str, name: &str| {
+        let effect = effects.iter().find(|effect| effect.id == id)?;
+        effect.parameters.iter().find(|p| p.name == name).map(|p| p.value)
+    };
+    let is_convention = match (value("hysteresis", "width"), value("actuation-gain", "scale")) {
+        (Some(width), Some(scale)) => (scale - 1.0).abs() < width,
+        _ => false,
+    };
+    for k in order {
+        sum += effects[k].share;
+        let effect = &mut effects[k];
+        if sum <= MINOR_SHARE || own[k] < MINOR_MISFIT || (is_convention && effect.id == "actuation-gain") {
+            effect.role = Part::Minor;
+        }
+    }
 }
 
 /// Share of the held-out χ² above the noise that `best` removes from `without`.
@@ -525,6 +576,8 @@ fn discretisation(search: &Search, best: &Scored, coarse: &Scored) -> Adopted {
             at_bound: at + 1 == resolutions.len(),
         }],
         tied_with: Vec::new(),
+        share: 0.0,
+        role: Part::Cause,
         gain_heldout: gain(search, best, coarse),
         fixed: Vec::new(),
     }

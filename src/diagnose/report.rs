@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::diagnosis::{Diagnosis, Stage, Verdict};
+use super::diagnosis::{Diagnosis, Part, Stage, Verdict};
 use super::fit::sum_of_squares;
 use super::names;
 use super::picture;
@@ -232,10 +232,11 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         let tied = if others.is_empty() { String::new() } else { format!(" Tied with {}.", others.join(", ")) };
         let _ = writeln!(
             out,
-            "<p class=\"small\"><strong>{}</strong> ({}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
+            "<p class=\"small\"><strong>{}</strong> ({}{}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
              noise.{tied}</p>",
             escape(&names::cause(&effect.id)),
             effect.kind,
+            if effect.role == Part::Minor { "; minor" } else { "" },
             effect.id,
             prose(&effect.cause),
             fixed(100.0 * effect.gain_heldout, 1)

@@ -1,6 +1,6 @@
 //! The verdict of a diagnosis in a sentence.
 
-use super::diagnosis::{Adopted, Verdict};
+use super::diagnosis::{Adopted, Part, Verdict};
 use super::names;
 use super::residual_tests::ResidualTest;
 
@@ -53,9 +53,10 @@ pub(super) fn summary(
         let parameters: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();
         format!("{} ({})", names::with_form(&effect.id, &names::form_of(effect)), parameters.join("; "))
     };
-    let physics: Vec<&Adopted> = effects.iter().filter(|effect| effect.id != "discretisation").collect();
+    let (physics, minor): (Vec<&Adopted>, Vec<&Adopted>) =
+        effects.iter().filter(|effect| effect.id != "discretisation").partition(|effect| effect.role == Part::Cause);
     let named = physics.iter().map(|effect| name(effect)).collect::<Vec<_>>().join("; ");
-    match verdict {
+    let main = match verdict {
         Verdict::None => match (insufficient, failing) {
             (Some(insufficient), _) => format!("Nothing stands out, but {insufficient}{}.", but.replacen(", but", ", and", 1)),
             (None, None) => format!("Nothing is missing: the nominal model{finely} explains the data to the noise."),
@@ -89,7 +90,12 @@ pub(super) fn summary(
                 but.replacen(", but", ", and", 1)
             ),
         },
+    };
+    if minor.is_empty() {
+        return main;
     }
+    let names: Vec<String> = minor.iter().map(|effect| names::cause(&effect.id)).collect();
+    format!("{main} A rest of less than half the noise or 2 % of the misfit goes with {}; that is no cause.", names.join(", "))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use sfers::diagnose::dataset::Dataset;
-use sfers::diagnose::diagnosis::{Adopted, Diagnosis, Verdict};
+use sfers::diagnose::diagnosis::{Adopted, Diagnosis, Part, Verdict};
 use sfers::diagnose::pipeline::{Outcome, diagnose};
 use sfers::diagnose::plant::Model;
 use sfers::diagnose::robot::RobotPlant;
@@ -24,9 +24,9 @@ pub fn diagnosed(folder: &Path) -> Outcome {
 /// Causes that motion alone cannot tell apart (docs/validation.md): one name of a line stands for all.
 const INSEPARABLE: [&[&str]; 2] = [&["stiffness", "areal-mass"], &["time-delay", "sensor-delay"]];
 
-/// Adopted causes beside the discretisation.
+/// Causes beside the discretisation, without minor ones.
 pub fn physics(d: &Diagnosis) -> Vec<&Adopted> {
-    d.effects.iter().filter(|effect| effect.id != "discretisation").collect()
+    d.effects.iter().filter(|effect| effect.id != "discretisation" && effect.role == Part::Cause).collect()
 }
 
 /// Their names.

@@ -13,7 +13,7 @@ pub use page::page;
 use super::DiagnoseError;
 use super::candidates::candidates;
 use super::dataset::{Dataset, Observation};
-use super::diagnosis::{Adopted, Diagnosis, Estimate, Ranked, RunError, Stage, Verdict};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Part, Ranked, RunError, Stage, Verdict};
 use super::fit::{Convergence, Estimator, Fit};
 use super::names;
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
@@ -189,6 +189,8 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
                         at_bound: term.x[0] <= free.bounds[0] || term.x[0] >= free.bounds[1],
                     }],
                     tied_with: Vec::new(),
+                    share: 1.0,
+                    role: Part::Cause,
                     gain_heldout: 0.0,
                     fixed: c.fixed.iter().map(|(name, value)| ((*name).into(), *value)).collect(),
                 }

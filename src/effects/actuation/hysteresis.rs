@@ -13,7 +13,8 @@
 //! between 0 and 1500 V opens by 1500 V · width at its middle. The plays start at rest at the first voltage, or (`from_zero = 1`) have come to it
 //! from 0 V.
 //!
-//! g is the slope that is called the loop's gain, a convention.
+//! g is a convention: `gain`, or (`pinned = 1`) the one with which a steady loop between 0 and 1500 V has the secant 1, so that the gain over a full
+//! stroke is left to `actuation-gain`.
 //!
 //! # Parameters
 //! * `width` (–): opening of the loop as a share of a 1500 V stroke
@@ -24,6 +25,7 @@
 //! * `shape` (–): exponent of the radius in the plays' weights (Prandtl-Ishlinskii)
 //! * `gain` (–): gain g of the loop
 //! * `from_zero` (–): 1: the plays have come to the first voltage from 0 V; 0: they start at rest there (Prandtl-Ishlinskii)
+//! * `pinned` (–): 1: the gain follows from the secant of a full stroke; 0: it is `gain`
 //! * `decay_per_kv` (1/kV): exponential decay of the plays' weights with the radius (Prandtl-Ishlinskii)
 //!
 //! # Source
@@ -90,12 +92,22 @@ pub const HYSTERESIS: Effect = Effect {
             default: Some(0.0),
             about: "exponential decay of the plays' weights with the radius (Prandtl-Ishlinskii)",
         },
+        Parameter {
+            name: "pinned",
+            unit: "",
+            bounds: [0.0, 1.0],
+            off: None,
+            default: Some(0.0),
+            about: "1: the gain follows from the loop, so that a full stroke of 1500 V is as long with it as without; 0: it is gain",
+        },
     ],
     action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p, n)) }),
 };
 
 /// Stroke to which the width refers (V).
 const STROKE: f64 = 1500.0;
+/// Steps towards the gain of a pinned loop.
+const PINNING_STEPS: usize = 6;
 /// Largest change of the state in a substep, as a share of its limit.
 const LARGEST_PART: f64 = 0.05;
 
@@ -119,18 +131,39 @@ struct BoucWen {
 
 impl BoucWen {
     fn new(p: &[f64], actuators: usize) -> Self {
+        let mut gain = if p[9] < 0.5 { p[6] } else { 1.0 };
+        // The secant changes little with the gain, so this converges in some steps.
+        for _ in 0..if p[9] < 0.5 { 0 } else { PINNING_STEPS } {
+            gain /= Self::with_gain(p, gain, 1).secant();
+        }
+        Self::with_gain(p, gain, actuators)
+    }
+
+    fn with_gain(p: &[f64], gain: f64, actuators: usize) -> Self {
         let b = p[1] / (1.0 + p[2]);
-        let limit = 0.5 * STROKE * p[0] / p[6];
         Self {
             slope: p[1],
             b,
             c: p[2] * b,
             exponent: p[3],
-            limit,
-            gain: p[6],
+            limit: 0.5 * STROKE * p[0] / gain,
+            gain,
             volts: vec![0.0; actuators],
             state: vec![0.0; actuators],
         }
+    }
+
+    /// Slope between the ends of a steady loop from 0 to a full stroke.
+    fn secant(mut self) -> f64 {
+        let mut ends = [0.0; 2];
+        for _ in 0..2 {
+            for (end, volts) in ends.iter_mut().zip([STROKE, 0.0]) {
+                let mut out = [volts];
+                self.pass(0.0, &mut out);
+                *end = out[0];
+            }
+        }
+        (ends[0] - ends[1]) / STROKE
     }
 
     /// dh/dV at the state `h` for a voltage that changes in the direction `sign`.
@@ -202,13 +235,16 @@ struct Plays {
 
 impl Plays {
     fn new(p: &[f64], actuators: usize) -> Self {
-        let (width, shape, gain, decay) = (p[0], p[5], p[6], 1e-3 * p[8]);
+        let (width, shape, decay) = (p[0], p[5], 1e-3 * p[8]);
         let radii = std::array::from_fn(radius);
         let raw: [f64; RADII] = radii.map(|r: f64| r.powf(shape) * (-decay * r).exp());
         // Half way through a stroke of S between turning points, the branches of a play of radius r are min(2 r, S − 2 r) apart, or not at all.
         let opening: f64 = raw.iter().zip(&radii).map(|(w, r)| w * (2.0 * r).min(STROKE - 2.0 * r).max(0.0)).sum();
-        let scale = width * STROKE / opening / gain;
-        Self { weights: raw.map(|w| scale * w), radii, gain, from_zero: p[7] > 0.5, plays: vec![0.0; RADII * actuators] }
+        let scale = width * STROKE / opening;
+        // A play of radius r follows all of a stroke S but 2 r.
+        let lost: f64 = raw.iter().zip(&radii).map(|(w, r)| scale * w * (2.0 * r / STROKE).min(1.0)).sum();
+        let gain = if p[9] < 0.5 { p[6] } else { 1.0 + lost };
+        Self { weights: raw.map(|w| scale * w / gain), radii, gain, from_zero: p[7] > 0.5, plays: vec![0.0; RADII * actuators] }
     }
 }
 
@@ -268,10 +304,10 @@ mod tests {
     fn the_opening_of_the_loop_is_the_width_at_any_rate() {
         for step in [1.0, 15.0] {
             // With a steep slope the Bouc-Wen state is at its limit half way.
-            let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3], 1), step);
+            let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3, 0.0, 0.0, 0.0], 1), step);
             assert!((bouc_wen / 150.0 - 1.0).abs() < 1e-3, "{bouc_wen}");
         }
-        let plays = opening(&mut Plays::new(&[0.1, 0.0, 0.0, 1.0, 1.0, 0.5, 1.3, 0.0, 1.0], 1), 15.0);
+        let plays = opening(&mut Plays::new(&[0.1, 0.0, 0.0, 1.0, 1.0, 0.5, 1.3, 0.0, 1.0, 0.0], 1), 15.0);
         assert!((plays / 150.0 - 1.0).abs() < 1e-9, "{plays}");
     }
 
@@ -281,7 +317,7 @@ mod tests {
         for exponent in [1.0, 1.5, 2.0] {
             for asymmetry in [-0.9, 0.0, 1.0] {
                 for (width, volts) in [(1e-9, 1500.0), (1e-300, 1.0), (0.2, 1e10), (0.2, 1e300)] {
-                    let mut hysteresis = BoucWen::new(&[width, 0.5, asymmetry, exponent, 0.0, 0.0, 1.0], 1);
+                    let mut hysteresis = BoucWen::new(&[width, 0.5, asymmetry, exponent, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 1);
                     let start = std::time::Instant::now();
                     hysteresis.settle(&mut [0.0]);
                     for sign in [1.0, -1.0, 1.0] {
@@ -295,8 +331,34 @@ mod tests {
     }
 
     #[test]
+    fn a_pinned_loop_passes_a_full_stroke_unchanged() {
+        let range = |hysteresis: &mut dyn SignalStage| {
+            hysteresis.settle(&mut [0.0]);
+            let mut ends = [0.0; 2];
+            for _ in 0..3 {
+                for (end, volts) in ends.iter_mut().zip([-1500.0, 0.0]) {
+                    let mut out = [volts];
+                    hysteresis.pass(1.0, &mut out);
+                    *end = out[0];
+                }
+            }
+            ends[1] - ends[0]
+        };
+        for (width, slope, asymmetry) in [(0.1, 0.5, 0.0), (0.4, 1.0, 0.3), (0.05, 0.2, -0.5)] {
+            let bouc_wen = range(&mut BoucWen::new(&[width, slope, asymmetry, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0], 1));
+            // A loop that is not symmetric differs between the two directions of the stroke.
+            let limit = if asymmetry == 0.0 { 1e-6 } else { 0.02 };
+            assert!((bouc_wen / 1500.0 - 1.0).abs() < limit, "{width} {slope}: {bouc_wen}");
+        }
+        for decay in [0.0, 5.0] {
+            let plays = range(&mut Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 0.0, decay, 1.0], 1));
+            assert!((plays / 1500.0 - 1.0).abs() < 1e-12, "{plays}");
+        }
+    }
+
+    #[test]
     fn a_minor_loop_closes() {
-        let mut plays = Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 1.0, 0.0], 1);
+        let mut plays = Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 1.0, 0.0, 0.0], 1);
         plays.settle(&mut [0.0]);
         let mut at = |volts: f64| {
             let mut out = [volts];
