@@ -31,6 +31,9 @@ const MOST_ITERATIONS_TO_RANK: usize = 8;
 /// Values in a block over which residuals may be correlated.
 pub(super) const BLOCK: usize = 50;
 
+/// Two-sided 95 % quantiles of Student's distribution of 1, 2, ... degrees of freedom.
+const STUDENT_95: [f64; 12] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179];
+
 /// Predicted values in each of the cache's two generations.
 const MOST_KEPT: usize = 2_000_000;
 
@@ -382,7 +385,8 @@ impl<'a> Estimator<'a> {
 
     /// Variance inflation of each coordinate over that of independent noise, by the sandwich estimator: C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against
     /// C = (JᵀJ)⁻¹, summed over blocks b within which residuals may be correlated. Blocks are 50 values, or whole runs (times R/(R − 1) for R
-    /// runs); the larger ratio counts, and it is at least 1 and at least χ² per value.
+    /// runs); the larger ratio counts, and it is at least 1 and at least χ² per value. What exceeds 1 is known from R runs only: it is multiplied by
+    /// (t/1.96)² with the 95 % quantile t of Student's distribution of R − 1 degrees of freedom, 1 at least.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
@@ -407,8 +411,11 @@ impl<'a> Estimator<'a> {
         let count = self.count(runs).max(1) as f64;
         let least = (residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>() / count).max(1.0);
         let (short, whole) = (ratios(BLOCK), ratios(usize::MAX));
+        let t = STUDENT_95[runs.len().saturating_sub(2).min(STUDENT_95.len() - 1)];
+        let known = (t / 1.96_f64).powi(2);
         // `max` ignores the NaN of a coordinate that the runs do not determine.
-        Ok(short.into_iter().zip(whole).map(|(short, whole)| least.max(short).max(few * whole)).collect())
+        let ratio = |(short, whole): (f64, f64)| 1.0 + known * (least.max(short).max(few * whole) - 1.0);
+        Ok(short.into_iter().zip(whole).map(ratio).collect())
     }
 
     /// All but the cache of predictions, for [`restore`](Self::restore).

@@ -117,7 +117,7 @@ fn without_trend(times: &[f64], values: &[f64], period: Option<f64>) -> Option<(
             1 => 2.0 * t / length - 1.0,
             _ => {
                 let angle = std::f64::consts::TAU * (column / 2) as f64 * t / period.unwrap_or(1.0);
-                if column % 2 == 0 { angle.cos() } else { angle.sin() }
+                if column.is_multiple_of(2) { angle.cos() } else { angle.sin() }
             }
         }
     };
