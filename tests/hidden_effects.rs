@@ -114,7 +114,7 @@ fn faults_of_the_bench_are_found_as_such_and_are_no_causes() {
         generator::write_on(folder.path(), &case(effects, 1, seed), &Bench::of("bench", seed).unwrap());
         diagnosed(folder.path()).diagnosis
     };
-    let d = on_a_bench(&[], 8);
+    let d = on_a_bench(&[], 2);
     assert_eq!((d.verdict, names(&d)), (Verdict::None, vec![]), "{}", d.summary);
     let spread = |id: &str| d.bench.iter().find(|fault| fault.id == id).map_or(0.0, |fault| fault.spread);
     // Of eleven runs, a factor of two in all but some 0.5 % of cases.

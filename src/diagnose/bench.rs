@@ -302,6 +302,15 @@ pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
                 .unwrap_or(off);
             (spread, now) = best;
         }
+        // A gain and a scale do nearly the same, so the first of the two that is tried takes the effect of both.
+        if free.contains(&Spread::GAIN) && free.contains(&Spread::SCALE) {
+            let mut swapped = spread;
+            swapped.of.swap(Spread::GAIN, Spread::SCALE);
+            let other = cost(runs, &swapped);
+            if other < now {
+                (spread, now) = (swapped, other);
+            }
+        }
         if spread == before {
             break;
         }

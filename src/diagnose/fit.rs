@@ -196,7 +196,7 @@ impl<'a> Estimator<'a> {
         self.faults.get(run).map_or(0.0, |columns| columns.eliminate(&model.spread, residuals))
     }
 
-    /// Residuals of several runs, and what the spread of the bench's faults costs each (log det of [`bench`]).
+    /// Residuals of several runs, and what the spread of the bench's faults costs each (log det of [`mod@bench`]).
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
