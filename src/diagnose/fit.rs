@@ -469,7 +469,7 @@ impl<'a> Estimator<'a> {
             let weights: Vec<f64> =
                 signal.sigmas.iter().zip(&self.used[run]).map(|(sigma, used)| if *used { 1.0 / sigma } else { 0.0 }).collect();
             let whiten = |column: &mut [f64]| self.noise.whiten(signal, &self.used[run], column);
-            Ok(Columns::new(signal, [&now[..], &rate, &by_gain], &weights, nuisance.base, whiten))
+            Ok(Columns::new(&signal.channels, &signal.times, [&now[..], &rate, &by_gain], &weights, nuisance.base, whiten))
         };
         let columns: Vec<Columns> = (0..plant.signals().len()).into_par_iter().map(columns).collect::<Result<_, _>>()?;
         self.faults = columns;

@@ -29,6 +29,9 @@ pub mod pipeline;
 pub mod plant;
 pub mod protocols;
 pub mod quality;
+#[cfg(test)]
+#[path = "../../tests/common/random.rs"]
+mod random;
 #[cfg(feature = "view")]
 pub mod report;
 pub mod residual_tests;

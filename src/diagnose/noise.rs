@@ -307,21 +307,12 @@ impl Filter {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Normal numbers from a linear congruential generator.
-    fn normal(state: &mut u64) -> f64 {
-        let mut uniform = || {
-            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (*state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let (a, b) = (uniform().max(1e-300), uniform());
-        (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-    }
+    use crate::diagnose::random::Random;
 
     /// Runs of a sine of 2, 5 and 12 Hz and a staircase, 2 s in rows of 2 ms, with residuals of `of(t, phase, state)` σ.
-    fn data(of: impl Fn(f64, f64, &mut u64, &mut f64) -> f64) -> (Vec<Signal>, Vec<Vec<bool>>, Vec<Vec<f64>>) {
+    fn data(of: impl Fn(f64, f64, &mut Random, &mut f64) -> f64) -> (Vec<Signal>, Vec<Vec<bool>>, Vec<Vec<f64>>) {
         let (mut signals, mut residuals) = (Vec::new(), Vec::new());
-        let mut state = 7;
+        let mut random = Random::new(7);
         for hertz in [2.0, 5.0, 12.0, 0.0] {
             let (mut signal, mut r, mut memory) = (Signal::default(), Vec::new(), 0.0);
             for row in 0..1000 {
@@ -331,7 +322,7 @@ mod tests {
                 signal.channels.push(0);
                 signal.values.push(0.0);
                 signal.inputs.push(if hertz == 0.0 { -300.0 * (2.0 * t).floor() } else { -500.0 * (1.0 - phase.cos()) });
-                r.push(of(t, phase, &mut state, &mut memory));
+                r.push(of(t, phase, &mut random, &mut memory));
             }
             signals.push(signal);
             residuals.push(r);
@@ -343,7 +334,7 @@ mod tests {
     #[test]
     fn the_level_is_that_of_what_does_not_repeat() {
         // A model error of 3 σ that follows the input, under noise of twice its stated size.
-        let (signals, used, residuals) = data(|_, phase, state, _| 3.0 * (2.0 * phase).sin() + 2.0 * normal(state));
+        let (signals, used, residuals) = data(|_, phase, random, _| 3.0 * (2.0 * phase).sin() + 2.0 * random.normal());
         let noise = estimate(&signals, &used, &residuals).unwrap();
         assert!((noise.factors[0] - 2.0).abs() < 0.2 && noise.correlated == 0.0, "{noise:?}");
         let white = Noise { factors: vec![1.0], ..Noise::default() };
@@ -355,9 +346,9 @@ mod tests {
         let time = 0.03;
         let decay = f64::exp(-0.002 / time);
         // Half and half, of unit variance.
-        let (signals, used, residuals) = data(|_, _, state, memory| {
-            *memory = decay * *memory + (1.0 - decay * decay).sqrt() * normal(state);
-            (*memory + normal(state)) / 2f64.sqrt()
+        let (signals, used, residuals) = data(|_, _, random, memory| {
+            *memory = decay * *memory + (1.0 - decay * decay).sqrt() * random.normal();
+            (*memory + random.normal()) / 2f64.sqrt()
         });
         let noise = estimate(&signals, &used, &residuals).unwrap();
         // 4000 values at 31 rows per correlation time: some 5 % of error of the level, 30 % of the time.
@@ -374,7 +365,7 @@ mod tests {
 
     #[test]
     fn a_hum_is_no_noise() {
-        let (signals, used, residuals) = data(|t, _, state, _| 2.5 * (std::f64::consts::TAU * 7.3 * t).sin() + normal(state));
+        let (signals, used, residuals) = data(|t, _, random, _| 2.5 * (std::f64::consts::TAU * 7.3 * t).sin() + random.normal());
         assert_eq!(estimate(&signals, &used, &residuals), None);
     }
 }
