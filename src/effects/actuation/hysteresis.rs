@@ -25,8 +25,8 @@
 //! * `shape` (–): exponent of the radius in the plays' weights (Prandtl-Ishlinskii)
 //! * `gain` (–): gain g of the loop
 //! * `from_zero` (–): 1: the plays have come to the first voltage from 0 V; 0: they start at rest there (Prandtl-Ishlinskii)
-//! * `pinned` (–): 1: the gain follows from the secant of a full stroke; 0: it is `gain`
 //! * `decay_per_kv` (1/kV): exponential decay of the plays' weights with the radius (Prandtl-Ishlinskii)
+//! * `pinned` (–): 1: the gain follows from the loop, so that a full stroke of 1500 V is as long with it as without; 0: it is gain
 //!
 //! # Source
 //! Data sheet of the MFC actuator (width about 0.2); asymmetric loops: Fu et al., Sens. Actuators A 346 (2022) 113830.
