@@ -159,9 +159,8 @@ impl Columns {
         let sds = spread.columns(self.channels);
         let q = sds.len();
         // In units of the standard deviations: (I + D GᵀG D) v = D Gᵀ r, u = D v.
-        let matrix = DMatrix::from_fn(q, q, |i, j| f64::from(u8::from(i == j)) + sds[i] * self.gram[(i, j)] * sds[j]);
         let right = DVector::from_fn(q, |i, _| sds[i] * along[i]);
-        match matrix.cholesky() {
+        match scaled(&self.gram, &sds).cholesky() {
             Some(factor) => {
                 let v = factor.solve(&right);
                 (v.iter().zip(&sds).map(|(v, sd)| v * sd).collect(), log_det(&factor))
@@ -186,8 +185,7 @@ impl Columns {
         let values = self.faults(spread, residuals);
         let sds = spread.columns(self.channels);
         let q = sds.len();
-        let matrix = DMatrix::from_fn(q, q, |i, j| f64::from(u8::from(i == j)) + sds[i] * self.gram[(i, j)] * sds[j]);
-        let inverse = matrix.cholesky().map(|factor| factor.inverse());
+        let inverse = scaled(&self.gram, &sds).cholesky().map(|factor| factor.inverse());
         let of = |column: usize| Fault {
             kind: kind(column, self.channels),
             channel: column.checked_sub(SHARED).map(|k| k % self.channels),
@@ -233,6 +231,11 @@ impl Columns {
     }
 }
 
+/// I + D GᵀG D, with the standard deviations D on its diagonal.
+fn scaled(gram: &DMatrix<f64>, sds: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(sds.len(), sds.len(), |i, j| f64::from(u8::from(i == j)) + sds[i] * gram[(i, j)] * sds[j])
+}
+
 fn log_det(factor: &nalgebra::Cholesky<f64, nalgebra::Dyn>) -> f64 {
     factor.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum()
 }
@@ -243,8 +246,7 @@ fn cost(runs: &[Moments], spread: &Spread) -> f64 {
     let (mut sum, mut information, mut right) = (0.0, DMatrix::zeros(q, q), DVector::zeros(q));
     for run in runs.iter().filter(|run| run.along.len() == q) {
         let sds = spread.columns(run.channels);
-        let matrix = DMatrix::from_fn(q, q, |i, j| f64::from(u8::from(i == j)) + sds[i] * run.gram[(i, j)] * sds[j]);
-        let Some(factor) = matrix.cholesky() else { return f64::INFINITY };
+        let Some(factor) = scaled(run.gram, &sds).cholesky() else { return f64::INFINITY };
         let d = DMatrix::from_diagonal(&DVector::from_vec(sds));
         let v = factor.solve(&(&d * &run.along));
         sum += log_det(&factor) - v.dot(&(&d * &run.along));

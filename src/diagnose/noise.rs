@@ -180,8 +180,13 @@ pub fn estimate(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) 
     }
     let typical: Vec<&Rest> = rests.iter().filter(|rest| variance(rest) <= 2.0 * levels[rest.channel].unwrap_or(mean)).collect();
     let (correlated, time_s) = correlation(&typical)?;
+    let noise = |levels: &[Option<f64>]| Noise {
+        factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(),
+        correlated,
+        time_s,
+    };
     if correlated == 0.0 {
-        return Some(Noise { factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(), correlated, time_s });
+        return Some(noise(&levels));
     }
     // Trends take more of correlated noise than their number of coefficients: the level is that of the innovations, which are white.
     let white: Vec<Rest> = rests
@@ -192,8 +197,7 @@ pub fn estimate(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) 
             Rest { values: values.collect(), ..*rest }
         })
         .collect();
-    let levels = levels_of(&white);
-    Some(Noise { factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(), correlated, time_s })
+    Some(noise(&levels_of(&white)))
 }
 
 /// Share and correlation time (s) that fit the autocorrelations best; none if these oscillate.
