@@ -125,8 +125,9 @@ pub fn diagnose(
         effects.push(adopted(&search, &best, index, term, &intervals, &tied)?);
     }
     for effect in &mut effects {
-        let tried = nearest.iter().find(|(id, _)| *id == effect.id);
-        effect.nearest = tried.map(|(_, tried)| tried.clone()).unwrap_or_default();
+        let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
+        let own = nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
+        effect.nearest = own.map(|(_, tried)| tried.clone()).unwrap_or_default();
     }
     set_roles(&mut effects, whole);
     let physics = effects.iter().filter(|effect| effect.role == Part::Cause && effect.id != "discretisation").count();
@@ -346,8 +347,8 @@ struct Causes {
     spikes: usize,
     /// χ² per value above 1 of the model with free forms; infinite without any.
     open: f64,
-    /// The names that were tried for free forms, by the name that stands or the free form.
-    nearest: Vec<(&'static str, Vec<Nearest>)>,
+    /// The places of every free form, and the names that were tried in its stead.
+    nearest: Vec<(Vec<&'static str>, Vec<Nearest>)>,
 }
 
 /// The causes, after the final refit; none where the data are insufficient.
@@ -397,8 +398,7 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     }
     causes.open = causes.best.above(search.estimator.count(&search.split.all()));
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
-    let of_term = best.model().terms.iter().zip(nearest).filter(|(_, tried)| !tried.is_empty());
-    causes.nearest = of_term.map(|(term, tried)| (search.candidate(term).id, tried)).collect();
+    causes.nearest = nearest;
     causes.best = search.backward(best)?;
     causes.replaced = search.replacements(&causes.best, 4)?;
     causes.coarse_total = causes.best.total();

@@ -243,6 +243,11 @@ impl Search<'_> {
         gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
     }
 
+    /// True if a free form is better than a name on held-out runs and by BIC.
+    fn is_closer(&self, free: &Scored, named: &Scored) -> bool {
+        self.judged(free) < self.judged(named) && free.bic() < named.bic() - LEAST_BIC
+    }
+
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
     fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
@@ -490,7 +495,9 @@ impl Search<'_> {
         ahead.dedup();
         for index in ahead.into_iter().flatten() {
             let model = trials[index].scored.model().clone();
-            trials[index].scored = self.fitted(&model)?;
+            if let Ok(scored) = self.fitted(&model) {
+                trials[index].scored = scored;
+            }
         }
         trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
         Ok((trials, screened))
@@ -510,10 +517,10 @@ impl Search<'_> {
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
             let (trials, screened) = self.trials(&best)?;
-            // A free form has to be worth more than the best name.
+            // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
             let top_of = |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
             let top = match (top_of(false), top_of(true)) {
-                (Some(named), Some(free)) => Some(if self.is_worth(free, named) { free } else { named }),
+                (Some(named), Some(free)) => Some(if self.is_closer(free, named) { free } else { named }),
                 (named, free) => named.or(free),
             };
             let top = top.cloned();

@@ -168,7 +168,8 @@ impl JointExtensions {
     /// Slope s and constant part e* + s u* of friction about the rate `u` of the joint in a lane.
     fn friction(&self, lane: usize, u: f64, turned_back: bool) -> (f64, f64) {
         let [moment, slope] = self.resistance(lane, u);
-        if u.abs() > FAST * DRY_FRICTION_RATE && !turned_back {
+        // A curve of the rate is smooth.
+        if (self.extensions.dry_friction == 0.0 || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
             (slope, slope * u - moment)
         } else {
             (if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0)
