@@ -7,7 +7,7 @@
 use super::DiagnoseError;
 use super::diagnosis::Nearest;
 use super::plant::{Model, Term};
-use super::search::{Scored, Search};
+use super::search::{PROMISING_IN_PLACE, Scored, Search};
 
 /// A name stands if it takes this share of what the free form takes on held-out runs.
 const LEAST_TAKEN: f64 = 0.95;
@@ -73,7 +73,11 @@ fn names(search: &Search, best: &Scored, index: usize) -> Result<(Option<Scored>
     };
     let is_rival = |model: &Model| model.terms.last().is_some_and(|term| !search.candidate(term).is_free_form && of_place(term));
     let screened = search.screen(&bare)?.ranked;
-    for model in search.finalists(screened.iter().filter(|(_, model)| is_rival(model)), MOST_NAMES) {
+    let own = PROMISING_IN_PLACE * (bare.total() - best.total());
+    let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| is_rival(model)).collect();
+    // The nearest one is shown even if it is far.
+    let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
+    for model in search.finalists(promising, MOST_NAMES) {
         if let Some(term) = model.terms.last() {
             attempt(search.candidate(term).id, model.clone());
         }

@@ -93,7 +93,8 @@ pub fn diagnose(
         calibrated = search.calibrated(start)?;
     }
     let insufficient = insufficient_data(plant, &search.split);
-    let Causes { best, trials, replaced, coarse_total, spikes: more, open, nearest } = find(&mut search, &calibrated, insufficient.is_some())?;
+    let Causes { best, trials, replaced, coarse_total, spikes: more, open, nearest } =
+        find(&mut search, &calibrated, insufficient.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
     }
@@ -202,7 +203,11 @@ pub fn diagnose(
             failed.as_deref(),
         ),
         // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
-        unexplained_fraction: if is_unexplained || has_rest { unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
+        unexplained_fraction: if is_unexplained || has_rest {
+            unexplained_fraction
+        } else {
+            unexplained_fraction.min(left.min(1.0))
+        },
         unexplained,
         noise_mm: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64,
         noise_correlated: noise.correlated,
@@ -257,7 +262,8 @@ fn judge(search: &Search, mut best: Scored, bare: &Scored, open: f64, nominal_re
     let above = |scored: &Scored| scored.above(count);
     let (left, whole) = (above(&best), above(bare));
     let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
-    let cause_count = best.model().terms.len().max(2) as f64 - 1.0;
+    let is_cause = |term: &&Term| !plant.candidates()[term.candidate].is_constant;
+    let cause_count = best.model().terms.iter().filter(is_cause).count().max(2) as f64 - 1.0;
     let least = left.min(open);
     let is_unexplained = least > LEFT_OVER && least > LEFT_SHARE / cause_count * whole;
     let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
@@ -354,32 +360,38 @@ struct Causes {
 /// The causes, after the final refit; none where the data are insufficient.
 ///
 /// A cause that differs from run to run, such as a gain that depends on the voltage, looks like a fault of the bench, and many small faults look like a
-/// cause. So where faults are estimated, causes are selected with and without them in the way, and the less costly model counts.
+/// cause. So causes are selected first without the bench's faults in the way. If faults are left after that, they are selected again with faults in
+/// the way, and the less costly model counts.
 fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
-    let mut causes = select(search, calibrated, is_insufficient)?;
     let cost = |causes: &Causes, search: &Search| {
         let count = search.estimator.count(&search.split.all()) as f64;
         causes.best.total() + causes.best.freedom() as f64 * count.ln()
     };
     search.estimator.only_given_faults = true;
     let without = search.estimator.spread(calibrated.model(), &[])?;
-    if !is_insufficient && causes.best.model().spread != without {
-        (search.progress)("causes before faults of the bench");
-        let first = cost(&causes, search);
+    let has_faults = calibrated.model().spread != without;
+    search.estimator.only_given_faults = has_faults;
+    let start = if has_faults {
+        search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?
+    } else {
+        calibrated.clone()
+    };
+    let mut causes = select(search, &start, is_insufficient)?;
+    if has_faults && causes.best.model().spread != without {
+        (search.progress)("causes with faults of the bench in the way");
+        let plain = cost(&causes, search);
         let after = (search.estimator.state(), search.split.clone());
         search.estimator.restore(before.0);
         search.split = before.1;
-        let plain = search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?;
-        let other = select(search, &plain, false)?;
-        if cost(&other, search) < first - LEAST_COST {
+        let other = select(search, calibrated, is_insufficient)?;
+        if cost(&other, search) <= plain + LEAST_COST {
             causes = other;
         } else {
             search.estimator.restore(after.0);
             search.split = after.1;
         }
     }
-    search.estimator.only_given_faults = false;
     name_causes(search, &mut causes)?;
 
     (search.progress)("the final refit");
@@ -392,15 +404,20 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
 
 /// Puts names in the stead of free forms where they stand.
 fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseError> {
-    let has_free_forms = |search: &Search, scored: &Scored| scored.model().terms.iter().any(|term| search.candidate(term).is_free_form);
+    let has_free_forms =
+        |search: &Search, scored: &Scored| scored.model().terms.iter().any(|term| search.candidate(term).is_free_form);
     if !has_free_forms(search, &causes.best) {
         return Ok(());
     }
     causes.open = causes.best.above(search.estimator.count(&search.split.all()));
+    let before = causes.best.model().clone();
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
     causes.nearest = nearest;
     causes.best = search.backward(best)?;
-    causes.replaced = search.replacements(&causes.best, 4)?;
+    let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
+    if ids(causes.best.model()) != ids(&before) {
+        causes.replaced = search.replacements(&causes.best, 4)?;
+    }
     causes.coarse_total = causes.best.total();
     Ok(())
 }
@@ -557,7 +574,11 @@ fn curve(search: &Search, best: &Scored, index: usize, found: &Intervals) -> Opt
     let slopes: Vec<Vec<f64>> = (0..term.x.len())
         .map(|k| {
             let mut moved = term.clone();
-            let by = if term.x[k] + parameters[k].scale > parameters[k].bounds[1] { -parameters[k].scale } else { parameters[k].scale };
+            let by = if term.x[k] + parameters[k].scale > parameters[k].bounds[1] {
+                -parameters[k].scale
+            } else {
+                parameters[k].scale
+            };
             moved.x[k] += by;
             let moved = plant.curve(&moved).map_or(Vec::new(), |curve| curve.points);
             moved.iter().zip(&points).map(|(a, b)| (a[1] - b[1]) / by).collect()

@@ -281,7 +281,10 @@ impl Plant for RobotPlant {
     }
 
     fn place_in_words(&self, place: &str) -> String {
-        effects::Place::ALL.iter().find(|known| known.name() == place).map_or_else(|| place.to_owned(), |known| known.words().into())
+        effects::Place::ALL
+            .iter()
+            .find(|known| known.name() == place)
+            .map_or_else(|| place.to_owned(), |known| known.words().into())
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {

@@ -31,6 +31,13 @@ const TIED_CHI2: f64 = 12.0;
 /// Candidates that are fitted after screening: named ones and free forms.
 const FINALISTS: usize = 7;
 const FREE_FINALISTS: usize = 3;
+/// Candidates are fitted whose linear estimate is at least this share of the best one's: in a search, among free forms, and in the place of a cause
+/// whose own share is 1.
+const PROMISING: f64 = 0.02;
+const PROMISING_FREE: f64 = 0.4;
+pub(super) const PROMISING_IN_PLACE: f64 = 0.3;
+/// Terms that are left out on trial in a round of elimination, the least significant ones.
+const LEAST_SIGNIFICANT: usize = 3;
 /// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
@@ -474,8 +481,11 @@ impl Search<'_> {
         (self.progress)("screening all candidates");
         let screened = self.screen(from)?;
         let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
-        let mut finalists = self.finalists(named, FINALISTS);
-        finalists.extend(self.finalists(free, FREE_FINALISTS));
+        let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let most_free = free.first().map_or(0.0, |(gain, _)| *gain);
+        let mut finalists = self.finalists(named.into_iter().filter(|(gain, _)| *gain >= PROMISING * most), FINALISTS);
+        finalists
+            .extend(self.finalists(free.into_iter().filter(|(gain, _)| *gain >= PROMISING_FREE * most_free), FREE_FINALISTS));
         let mut trials = Vec::new();
         for model in finalists {
             let Some(term) = model.terms.last() else { continue };
@@ -518,7 +528,8 @@ impl Search<'_> {
         for _ in 0..MOST_CAUSES {
             let (trials, screened) = self.trials(&best)?;
             // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
-            let top_of = |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
+            let top_of =
+                |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
             let top = match (top_of(false), top_of(true)) {
                 (Some(named), Some(free)) => Some(if self.is_closer(free, named) { free } else { named }),
                 (named, free) => named.or(free),
@@ -603,7 +614,7 @@ impl Search<'_> {
                 best = self.fitted(shorter(idle)?.model())?;
                 continue;
             }
-            let shorter = (0..best.model().terms.len()).map(shorter).collect::<Result<Vec<_>, _>>()?;
+            let shorter = self.least_significant(&best).into_iter().map(shorter).collect::<Result<Vec<_>, _>>()?;
             let Some(least) = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(best) };
             let least = self.fitted(least.model())?;
             if self.is_needed(&best, &least) || self.is_seen_by_fit(&best, &least) {
@@ -611,6 +622,26 @@ impl Search<'_> {
             }
             best = least;
         }
+    }
+
+    /// The [`LEAST_SIGNIFICANT`] terms by Wald's statistic dᵀ C⁻¹ d, with d the distances of a term's coordinates from their off values and C their
+    /// covariance.
+    fn least_significant(&self, best: &Scored) -> Vec<usize> {
+        let covariance = covariance(&best.fit.information);
+        let mut first = 0;
+        let mut order: Vec<(f64, usize)> = Vec::new();
+        for (index, term) in best.model().terms.iter().enumerate() {
+            let parameters = &self.candidate(term).parameters;
+            let own: Vec<(usize, f64)> =
+                (0..term.x.len()).filter_map(|k| Some((first + k, term.x[k] - parameters[k].off?))).collect();
+            first += term.x.len();
+            let part = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i].0, own[j].0)]);
+            let d = DVector::from_iterator(own.len(), own.iter().map(|(_, d)| *d));
+            let wald = part.lu().solve(&d).map_or(0.0, |solved| d.dot(&solved));
+            order.push((if wald.is_finite() { wald } else { 0.0 }, index));
+        }
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order.into_iter().take(LEAST_SIGNIFICANT).map(|(_, index)| index).collect()
     }
 
     /// True if `less`, a model with one term less, leaves out too much: new physics has to be worth it, a constant has to be significant only.
@@ -633,7 +664,9 @@ impl Search<'_> {
             let without = self.fitted(&model)?;
             let screened = self.screen(&without)?.ranked;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
-            let others = screened.iter().filter(|(_, m)| is_other(m) && !self.ends_free(m));
+            let own = without.total() - best.total();
+            let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m) && !self.ends_free(m);
+            let others = screened.iter().filter(is_promising);
             for model in self.finalists(others, most) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;

@@ -38,8 +38,12 @@ pub fn failing(tests: &[ResidualTest]) -> Option<String> {
 
 /// A place whose law has no name here: the place, and the nearest names with what they leave.
 fn located(effect: &Adopted, place_in_words: &dyn Fn(&str) -> String) -> String {
-    let near: Vec<String> =
-        effect.nearest.iter().take(2).map(|near| format!("{} leaves {:.0} % of it", names::cause(&near.id), 100.0 * near.left)).collect();
+    let near: Vec<String> = effect
+        .nearest
+        .iter()
+        .take(2)
+        .map(|near| format!("{} leaves {:.0} % of it", names::cause(&near.id), 100.0 * near.left))
+        .collect();
     let near = if near.is_empty() { String::new() } else { format!(" ({})", near.join(", ")) };
     format!("another law of {}, shown as a curve{near}", place_in_words(&effect.place))
 }
@@ -101,7 +105,7 @@ pub(super) fn summary(
                 but.replacen(", but", ":", 1)
             ),
             (None, false) => format!(
-                "{named} explains a part, but {:.0} % of the misfit is left, which no cause in the library explains{}.",
+                "{named} explains a part, but {:.1} % of the misfit is left, which no cause in the library explains{}.",
                 100.0 * left,
                 but.replacen(", but", ", and", 1)
             ),

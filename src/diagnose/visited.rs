@@ -46,7 +46,6 @@ impl Visited {
     }
 }
 
-
 /// What `runs` of the nominal robot visit: the drive, the time step (s) and the number of steps of each.
 ///
 /// # Errors

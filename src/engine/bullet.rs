@@ -376,8 +376,7 @@ impl Engine for BulletEngine {
     }
 
     fn save(&self) -> Result<Vec<f64>, EngineError> {
-        let mut state: Vec<f64> =
-            self.extensions.iter().flat_map(|extensions| extensions.memory.iter().copied()).collect();
+        let mut state: Vec<f64> = self.extensions.iter().flat_map(|extensions| extensions.memory.iter().copied()).collect();
         state.extend(self.world.snapshot()?.into_vec());
         Ok(state)
     }

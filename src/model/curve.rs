@@ -87,10 +87,7 @@ impl Curve {
             let t = distance / step - k as f64;
             let (a, b, p, q) = (value(k), value(k + 1), slope(k), slope(k + 1));
             let cubic = [a, p, 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q];
-            (
-                cubic[0] + t * (cubic[1] + t * (cubic[2] + t * cubic[3])),
-                cubic[1] + t * (2.0 * cubic[2] + 3.0 * t * cubic[3]),
-            )
+            (cubic[0] + t * (cubic[1] + t * (cubic[2] + t * cubic[3])), cubic[1] + t * (2.0 * cubic[2] + 3.0 * t * cubic[3]))
         };
         [y, sign * outward / step * ds]
     }

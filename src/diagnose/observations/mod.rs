@@ -123,7 +123,11 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         channels: vec![0],
         inputs: vec![0.0],
     });
-    let plant = Numbers { dataset, signals: signals.collect(), candidates: candidates(&Bench::new(&dataset.robot, 1), &Visited::NOTHING) };
+    let plant = Numbers {
+        dataset,
+        signals: signals.collect(),
+        candidates: candidates(&Bench::new(&dataset.robot, 1), &Visited::NOTHING),
+    };
     let runs: Vec<usize> = (0..plant.signals.len()).collect();
     let estimator = Estimator::new(&plant);
     let resolution = dataset.robot.motors_per_actuator as f64;

@@ -65,7 +65,31 @@ pub const CREEP: Effect = Effect {
         },
     ],
     places: &[Place::VoltageMemory],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("per_decade", 0.02), ("power", 0.2)], starts: &[&[0.02, 0.0]], given: &[("rungs_per_decade", 1.0)] }, Form { fitted: &[("per_decade", 0.02), ("power", 0.2)], starts: &[&[0.02, 0.0]], given: &[("rungs_per_decade", 2.0)] }, Form { fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)], starts: &[&[0.02, 0.3], &[0.02, 3.0]], given: &[("rungs_per_decade", 0.0)] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2)],
+                starts: &[&[0.02, 0.0]],
+                given: &[("rungs_per_decade", 1.0)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2)],
+                starts: &[&[0.02, 0.0]],
+                given: &[("rungs_per_decade", 2.0)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2)],
+                starts: &[&[0.02, 0.0]],
+                given: &[("rungs_per_decade", 1.0), ("fastest_s", 0.01)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
+                starts: &[&[0.02, 0.3], &[0.02, 3.0]],
+                given: &[("rungs_per_decade", 0.0)],
+            },
+        ],
+    },
     shape: None,
     action: Action::Voltages(|p, n, duration| {
         let chain = Chain { growth: p[0], power: p[1], per_decade: p[2], fastest: p[3] };

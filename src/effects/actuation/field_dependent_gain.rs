@@ -32,7 +32,10 @@ pub const FIELD_DEPENDENT_GAIN: Effect = Effect {
         },
     ],
     places: &[Place::VoltageCurve],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)], starts: &[&[0.05, 0.0]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)], starts: &[&[0.05, 0.0]], given: &[] }],
+    },
     shape: None,
     action: Action::Voltages(|p, _, _| Box::new(Gain { slope: 1e-3 * p[0], curvature: 1e-6 * p[1] })),
 };

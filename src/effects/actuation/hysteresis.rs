@@ -102,7 +102,26 @@ pub const HYSTERESIS: Effect = Effect {
         },
     ],
     places: &[Place::VoltageMemory],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3)], starts: &[&[0.05, 0.2, 0.0], &[0.2, 0.6, 0.0]], given: &[("exponent", 1.0), ("plays", 0.0), ("pinned", 1.0)] }, Form { fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)], starts: &[&[0.05, 0.0, 1.0], &[0.2, 0.5, 1.0]], given: &[("plays", 1.0), ("from_zero", 0.0), ("pinned", 1.0)] }, Form { fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)], starts: &[&[0.05, 0.0, 1.0]], given: &[("plays", 1.0), ("from_zero", 1.0), ("pinned", 1.0)] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[
+            Form {
+                fitted: &[("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3)],
+                starts: &[&[0.05, 0.2, 0.0], &[0.2, 0.6, 0.0]],
+                given: &[("exponent", 1.0), ("plays", 0.0), ("pinned", 1.0)],
+            },
+            Form {
+                fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                starts: &[&[0.05, 0.0, 1.0], &[0.2, 0.5, 1.0]],
+                given: &[("plays", 1.0), ("from_zero", 0.0), ("pinned", 1.0)],
+            },
+            Form {
+                fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                starts: &[&[0.05, 0.0, 1.0]],
+                given: &[("plays", 1.0), ("from_zero", 1.0), ("pinned", 1.0)],
+            },
+        ],
+    },
     shape: None,
     action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p, n)) }),
 };

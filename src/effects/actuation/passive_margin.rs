@@ -28,7 +28,10 @@ pub const PASSIVE_MARGIN: Effect = Effect {
         about: "share p of an actuator’s length that is passive, half of it at each end",
     }],
     places: &[Place::GainAlong],
-    fitting: Fitting::Candidate { on: fits::shape, forms: &[Form { fitted: &[("fraction", 0.05)], starts: &[&[0.08]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::shape,
+        forms: &[Form { fitted: &[("fraction", 0.05)], starts: &[&[0.08]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);

@@ -25,7 +25,10 @@ pub const WEAK_ACTUATOR: Effect = Effect {
         Parameter { name: "gain", unit: "", bounds: [0.0, 1.5], off: Some(1.0), default: None, about: "remaining gain" },
     ],
     places: &[Place::GainAlong],
-    fitting: Fitting::Candidate { on: fits::several_actuators, forms: &[Form { fitted: &[("gain", 0.1)], starts: &[&[0.95]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::several_actuators,
+        forms: &[Form { fitted: &[("gain", 0.1)], starts: &[&[0.95]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);

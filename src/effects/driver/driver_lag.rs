@@ -29,7 +29,10 @@ pub const DRIVER_LAG: Effect = Effect {
         about: "time constant T",
     }],
     places: &[Place::Drive],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("time_constant_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("time_constant_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
+    },
     shape: None,
     action: Action::Voltages(|p, n, _| Box::new(Follower::new(Lag { time: p[0] }, n))),
 };

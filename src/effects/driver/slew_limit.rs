@@ -29,7 +29,14 @@ pub const SLEW_LIMIT: Effect = Effect {
         about: "largest rate S",
     }],
     places: &[Place::Drive],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("rate_v_per_s", 2e-06)], starts: &[&[1.5e-06], &[3e-06], &[6e-06], &[1.2e-05], &[2.5e-05]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form {
+            fitted: &[("rate_v_per_s", 2e-06)],
+            starts: &[&[1.5e-06], &[3e-06], &[6e-06], &[1.2e-05], &[2.5e-05]],
+            given: &[],
+        }],
+    },
     shape: None,
     action: Action::Voltages(|p, n, _| Box::new(Follower::new(Slew { rate: p[0] }, n))),
 };

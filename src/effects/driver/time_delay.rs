@@ -21,7 +21,10 @@ pub const TIME_DELAY: Effect = Effect {
     source: "Derived.",
     parameters: &[Parameter { name: "delay_s", unit: "s", bounds: [0.0, 0.1], off: Some(0.0), default: None, about: "delay T" }],
     places: &[Place::Drive],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("delay_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("delay_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
+    },
     shape: None,
     action: Action::Drive(|p, drive| drive.delay += p[0]),
 };

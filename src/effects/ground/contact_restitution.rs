@@ -31,7 +31,10 @@ pub const CONTACT_RESTITUTION: Effect = Effect {
         about: "share e of the approach speed that is returned",
     }],
     places: &[Place::Impact],
-    fitting: Fitting::Candidate { on: fits::on_the_floor, forms: &[Form { fitted: &[("restitution", 0.1)], starts: &[&[0.1], &[0.4]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::on_the_floor,
+        forms: &[Form { fitted: &[("restitution", 0.1)], starts: &[&[0.1], &[0.4]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.restitution = p[0]),
 };

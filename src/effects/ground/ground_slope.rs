@@ -28,7 +28,10 @@ pub const GROUND_SLOPE: Effect = Effect {
         about: "slope α, positive uphill along +x",
     }],
     places: &[Place::Floor],
-    fitting: Fitting::Candidate { on: fits::on_the_floor, forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.5]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::on_the_floor,
+        forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.5]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.slope += p[0].to_radians()),
 };

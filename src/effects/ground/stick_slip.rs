@@ -49,7 +49,10 @@ pub const STICK_SLIP: Effect = Effect {
         },
     ],
     places: &[Place::FloorFriction],
-    fitting: Fitting::Candidate { on: fits::on_the_floor, forms: &[Form { fitted: &[("static_ratio", 0.2)], starts: &[&[1.2]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::on_the_floor,
+        forms: &[Form { fitted: &[("static_ratio", 0.2)], starts: &[&[1.2]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.stick_slip = StickSlip { ratio: p[0], speed: 0.1 * p[1], viscous: p[2] }),
 };

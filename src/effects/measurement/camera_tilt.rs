@@ -28,7 +28,10 @@ pub const CAMERA_TILT: Effect = Effect {
         about: "roll ψ",
     }],
     places: &[Place::Picture],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.3]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.3]], given: &[] }],
+    },
     shape: None,
     action: Action::View(|p, view| view.tilt += p[0].to_radians()),
 };

@@ -25,7 +25,10 @@ pub const SENSOR_OFFSET: Effect = Effect {
         Parameter { name: "z_mm", unit: "mm", bounds: [-100.0, 100.0], off: Some(0.0), default: Some(0.0), about: "added to z" },
     ],
     places: &[Place::Picture],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("x_mm", 0.2), ("z_mm", 0.2)], starts: &[&[0.1, 0.1]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("x_mm", 0.2), ("z_mm", 0.2)], starts: &[&[0.1, 0.1]], given: &[] }],
+    },
     shape: None,
     action: Action::View(|p, view| view.offset = [view.offset[0] + 0.1 * p[0], view.offset[1] + 0.1 * p[1]]),
 };

@@ -28,7 +28,10 @@ pub const AIR_DRAG: Effect = Effect {
         about: "drag coefficient C_d",
     }],
     places: &[Place::Air],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("drag_coefficient", 1.0)], starts: &[&[1.0], &[4.0]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("drag_coefficient", 1.0)], starts: &[&[1.0], &[4.0]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.drag[1] += p[0]),
 };

@@ -28,7 +28,10 @@ pub const CLAMP_COMPLIANCE: Effect = Effect {
         about: "turn c of the root per moment",
     }],
     places: &[Place::Clamp],
-    fitting: Fitting::Candidate { on: fits::clamped, forms: &[Form { fitted: &[("compliance_rad_per_n_m", 0.5)], starts: &[&[0.2], &[1.0]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::clamped,
+        forms: &[Form { fitted: &[("compliance_rad_per_n_m", 0.5)], starts: &[&[0.2], &[1.0]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.clamp_compliance += 1e-7 * p[0]),
 };

@@ -28,7 +28,10 @@ pub const DRY_FRICTION: Effect = Effect {
         about: "the moment τ_c in every joint",
     }],
     places: &[Place::JointMomentOfRate, Place::JointMemory],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("moment_mn_m", 0.1)], starts: &[&[0.05], &[0.3]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("moment_mn_m", 0.1)], starts: &[&[0.05], &[0.3]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.dry_friction += 1e4 * p[0]),
 };

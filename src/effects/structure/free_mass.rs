@@ -24,14 +24,55 @@ pub const FREE_MASS: Effect = Effect {
     equation: "m(s) = μ_A·w + Σ m_j δ(s − s_j)",
     source: "Derived.",
     parameters: &[
-        Parameter { name: "mass_1_g", unit: "g", bounds: [0.0, 5.0], off: Some(0.0), default: Some(0.0), about: "mass at 1/4 of the length" },
-        Parameter { name: "mass_2_g", unit: "g", bounds: [0.0, 5.0], off: Some(0.0), default: Some(0.0), about: "mass at 2/4 of the length" },
-        Parameter { name: "mass_3_g", unit: "g", bounds: [0.0, 5.0], off: Some(0.0), default: Some(0.0), about: "mass at 3/4 of the length" },
-        Parameter { name: "mass_4_g", unit: "g", bounds: [0.0, 5.0], off: Some(0.0), default: Some(0.0), about: "mass at 4/4 of the length" },
+        Parameter {
+            name: "mass_1_g",
+            unit: "g",
+            bounds: [0.0, 5.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "mass at 1/4 of the length",
+        },
+        Parameter {
+            name: "mass_2_g",
+            unit: "g",
+            bounds: [0.0, 5.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "mass at 2/4 of the length",
+        },
+        Parameter {
+            name: "mass_3_g",
+            unit: "g",
+            bounds: [0.0, 5.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "mass at 3/4 of the length",
+        },
+        Parameter {
+            name: "mass_4_g",
+            unit: "g",
+            bounds: [0.0, 5.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "mass at 4/4 of the length",
+        },
     ],
     places: &[Place::Mass],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("mass_1_g", 0.1), ("mass_2_g", 0.1), ("mass_3_g", 0.1), ("mass_4_g", 0.1)], starts: &[&[0.1, 0.0, 0.0, 0.0], &[0.0, 0.1, 0.0, 0.0], &[0.0, 0.0, 0.1, 0.0], &[0.0, 0.0, 0.0, 0.1]], given: &[] }] },
-    shape: Some(Shape { x: "share of the length", x_unit: "", y: "mass", y_unit: "g", points: |p| p.iter().enumerate().map(|(k, mass)| [0.25 * (k + 1) as f64, *mass]).collect() }),
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form {
+            fitted: &[("mass_1_g", 0.1), ("mass_2_g", 0.1), ("mass_3_g", 0.1), ("mass_4_g", 0.1)],
+            starts: &[&[0.1, 0.0, 0.0, 0.0], &[0.0, 0.1, 0.0, 0.0], &[0.0, 0.0, 0.1, 0.0], &[0.0, 0.0, 0.0, 0.1]],
+            given: &[],
+        }],
+    },
+    shape: Some(Shape {
+        x: "share of the length",
+        x_unit: "",
+        y: "mass",
+        y_unit: "g",
+        points: |p| p.iter().enumerate().map(|(k, mass)| [0.25 * (k + 1) as f64, *mass]).collect(),
+    }),
     action: Action::Robot(|p, robot| {
         let end = robot.material.actuator_length * robot.actuators as f64;
         let of = |(k, mass): (usize, &f64)| PointMass { mass: *mass, position: 0.25 * (k + 1) as f64 * end };

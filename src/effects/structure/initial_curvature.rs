@@ -39,7 +39,10 @@ pub const INITIAL_CURVATURE: Effect = Effect {
         },
     ],
     places: &[Place::RestShape],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("curvature_per_m", 0.2)], starts: &[&[0.1]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("curvature_per_m", 0.2)], starts: &[&[0.1]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| {
         let curvature = &mut robot.extensions.rest_curvature;

@@ -28,7 +28,10 @@ pub const STIFFNESS_SOFTENING: Effect = Effect {
         about: "the factor a",
     }],
     places: &[Place::JointMomentOfDeviation],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("softening_mm2", 500.0)], starts: &[&[500.0], &[-300.0]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("softening_mm2", 500.0)], starts: &[&[500.0], &[-300.0]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.softening += 0.01 * p[0]),
 };

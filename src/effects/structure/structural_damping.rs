@@ -28,7 +28,10 @@ pub const STRUCTURAL_DAMPING: Effect = Effect {
         about: "loss factor η_h; the damping ratio is half of it",
     }],
     places: &[Place::JointMemory, Place::JointMomentOfRate],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("loss_factor", 0.02)], starts: &[&[0.02]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("loss_factor", 0.02)], starts: &[&[0.02]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.loss.iter_mut().for_each(|share| *share += p[0] / 0.68)),
 };

@@ -33,7 +33,10 @@ pub const TIP_MASS: Effect = Effect {
         },
     ],
     places: &[Place::Mass],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("mass_g", 0.1)], starts: &[&[0.05], &[0.2]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("mass_g", 0.1)], starts: &[&[0.05], &[0.2]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| {
         let end = robot.material.actuator_length * robot.actuators as f64;
