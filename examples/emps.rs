@@ -18,16 +18,22 @@
 #[path = "measured/common.rs"]
 mod common;
 
+#[path = "measured/filter.rs"]
+mod filter;
+
 use std::error::Error;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::path::Path;
 
-use common::{candidate, causes, column, constant, folder, found, free, print, residuals, rms, shape};
+use common::{candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
+use filter::{central_differences, low_pass};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
 use sfers::diagnose::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 
+/// Mass (kg), viscous friction (N·s/m) and offset (N).
+const NOMINAL: [f64; 3] = [95.0, 411.0, -3.0];
 const NEWTONS_PER_VOLT: f64 = 35.15065;
 /// Interval of the raw rows (s), and rows of a cycle, forward and backward.
 const INTERVAL_S: f64 = 1e-3;
@@ -54,56 +60,22 @@ pub struct Emps {
     rows: Vec<(usize, usize)>,
 }
 
-/// A Butterworth filter of order 4, forward and backward, with odd reflections at the ends.
-fn low_pass(values: &[f64], hz: f64) -> Vec<f64> {
-    let (n, pad) = (values.len(), 200.min(values.len() - 1));
-    let before = (1..=pad).rev().map(|k| 2.0 * values[0] - values[k]);
-    let after = (1..=pad).map(|k| 2.0 * values[n - 1] - values[n - 1 - k]);
-    let mut all: Vec<f64> = before.chain(values.iter().copied()).chain(after).collect();
-    let warped = (PI * hz * INTERVAL_S).tan();
-    for _ in 0..2 {
-        // Damping ratios of the two pairs of poles.
-        for damping in [(PI / 8.0).cos(), (3.0 * PI / 8.0).cos()] {
-            let scale = 1.0 / (1.0 + 2.0 * damping * warped + warped * warped);
-            let (b, a1) = (warped * warped * scale, 2.0 * (warped * warped - 1.0) * scale);
-            let a2 = (1.0 - 2.0 * damping * warped + warped * warped) * scale;
-            let ([mut x1, mut x2], [mut y1, mut y2]) = ([all[0]; 2], [all[0]; 2]);
-            for value in &mut all {
-                let x = *value;
-                let y = b * (x + 2.0 * x1 + x2) - a1 * y1 - a2 * y2;
-                (x2, x1, y2, y1) = (x1, x, y1, y);
-                *value = y;
-            }
-        }
-        all.reverse();
-    }
-    all[pad..pad + n].to_vec()
-}
-
-/// Central differences (per second).
-fn rate(values: &[f64]) -> Vec<f64> {
-    let last = values.len() - 1;
-    let of = |i: usize| {
-        let (from, to) = (i.saturating_sub(1), (i + 1).min(last));
-        (values[to] - values[from]) / ((to - from) as f64 * INTERVAL_S)
-    };
-    (0..values.len()).map(of).collect()
-}
-
 fn candidates() -> Vec<Candidate> {
-    let ripple = || vec![free("cosine", "N", 0.0, [-20.0, 20.0], 1.0), free("sine", "N", 0.0, [-20.0, 20.0], 1.0)];
+    let part = |name| free(name, "N", 0.0, [-20.0, 20.0], 1.0);
     let pitches: [&[f64]; 4] = [&[1.0, 1.0, 5.0], &[1.0, 1.0, 10.0], &[1.0, 1.0, 20.0], &[1.0, 1.0, 40.0]];
     vec![
-        constant("mass", "The moved mass differs.", free("mass", "kg", 95.0, [20.0, 300.0], 5.0)),
-        constant("viscous-friction", "Viscous friction differs.", free("coefficient", "N·s/m", 411.0, [0.0, 1000.0], 20.0)),
+        constant("mass", "The moved mass differs.", free("mass", "kg", NOMINAL[0], [20.0, 300.0], 5.0)),
+        constant("viscous-friction", "Viscous friction differs.", free("coefficient", "N·s/m", NOMINAL[1], [0.0, 1000.0], 20.0)),
         // A Coulomb friction that differs by direction is a symmetric one and an offset.
-        constant("offset", "The force has another offset.", free("force", "N", -3.0, [-50.0, 50.0], 1.0)),
-        candidate("coulomb-friction", "Coulomb friction.", vec![free("force", "N", 0.0, [0.0, 100.0], 5.0)], &[&[10.0]]),
-        candidate(
+        constant("offset", "The force has another offset.", free("force", "N", NOMINAL[2], [-50.0, 50.0], 1.0)),
+        one("coulomb-friction", "Coulomb friction.", "force", "N", [0.0, 100.0], 5.0),
+        one(
             "viscous-friction-by-direction",
-            "Viscous friction differs between forward and backward.",
-            vec![free("forward_less_backward", "N·s/m", 0.0, [-400.0, 400.0], 20.0)],
-            &[&[20.0]],
+            "Viscous friction differs by direction.",
+            "forward_less_backward",
+            "N·s/m",
+            [-400.0, 400.0],
+            20.0,
         ),
         candidate(
             "stribeck-friction",
@@ -111,37 +83,17 @@ fn candidates() -> Vec<Candidate> {
             vec![free("force", "N", 0.0, [-60.0, 60.0], 2.0), shape("speed", "m/s", [1e-3, 0.1], 5e-3)],
             &[&[2.0, 5e-3], &[2.0, 0.02]],
         ),
-        candidate(
-            "presliding",
-            "Friction grows over a distance after a reversal (Dahl).",
-            vec![free("distance", "mm", 0.0, [0.0, 2.0], 0.02)],
-            &[&[0.02], &[0.2]],
-        ),
-        candidate(
-            "quadratic-drag",
-            "Drag grows with the square of the speed.",
-            vec![free("coefficient", "N·s²/m²", 0.0, [-3000.0, 3000.0], 100.0)],
-            &[&[100.0]],
-        ),
-        candidate(
-            "spring",
-            "The force depends on position.",
-            vec![free("stiffness", "N/m", 0.0, [-300.0, 300.0], 5.0)],
-            &[&[5.0]],
-        ),
-        candidate(
-            "wear",
-            "Viscous friction depends on position.",
-            vec![free("slope", "N·s/m²", 0.0, [-3000.0, 3000.0], 50.0)],
-            &[&[50.0]],
-        ),
+        one("presliding", "Friction grows over a distance after a reversal (Dahl).", "distance", "mm", [0.0, 2.0], 0.02),
+        one("quadratic-drag", "Drag grows with the square of the speed.", "coefficient", "N·s²/m²", [-3000.0, 3000.0], 100.0),
+        one("spring", "The force depends on position.", "stiffness", "N/m", [-300.0, 300.0], 5.0),
+        one("wear", "Viscous friction depends on position.", "slope", "N·s/m²", [-3000.0, 3000.0], 50.0),
         candidate(
             "ripple",
             "The force repeats with the turns of the screw or of the motor (cogging).",
-            [ripple(), vec![shape("pitch", "mm", [2.0, 60.0], 0.1)]].concat(),
+            vec![part("cosine"), part("sine"), shape("pitch", "mm", [2.0, 60.0], 0.1)],
             &pitches,
         ),
-        candidate("delay", "The force follows its command late.", vec![free("time", "ms", 0.0, [-10.0, 10.0], 0.5)], &[&[0.5]]),
+        one("delay", "The force follows its command late.", "time", "ms", [-10.0, 10.0], 0.5),
     ]
 }
 
@@ -151,10 +103,10 @@ impl Emps {
     /// # Errors
     /// If the file is not such a record.
     pub fn read(path: &Path) -> Result<Self, Box<dyn Error>> {
-        let position_m = low_pass(&column(path, "q_m")?, KINEMATICS_HZ);
+        let position_m = low_pass(&column(path, "q_m")?, KINEMATICS_HZ * INTERVAL_S);
         let volts = column(path, "v_v")?;
-        let force_n = low_pass(&volts.iter().map(|v| NEWTONS_PER_VOLT * v).collect::<Vec<_>>(), FORCE_HZ);
-        let velocity_m_s = rate(&position_m);
+        let force_n = low_pass(&volts.iter().map(|v| NEWTONS_PER_VOLT * v).collect::<Vec<_>>(), FORCE_HZ * INTERVAL_S);
+        let velocity_m_s = central_differences(&position_m, INTERVAL_S);
         let last = force_n.len();
         let repeats: Vec<f64> = (ENDS..last - CYCLE - ENDS).map(|i| (force_n[i + CYCLE] - force_n[i]) * FRAC_1_SQRT_2).collect();
         let ends = (0..).map(|k| FIRST_REVERSAL + k * STROKE).take_while(|end| *end < last - STROKE / 2);
@@ -173,7 +125,7 @@ impl Emps {
             }
         };
         let signals = rows.iter().enumerate().map(of).collect();
-        let acceleration_m_s2 = rate(&velocity_m_s);
+        let acceleration_m_s2 = central_differences(&velocity_m_s, INTERVAL_S);
         Ok(Self { signals, candidates: candidates(), position_m, velocity_m_s, acceleration_m_s2, rows })
     }
 
@@ -226,9 +178,9 @@ impl Plant for Emps {
     fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let value = |id: &str, name: &str| common::value(&self.candidates, model, id, name);
         let effect = |id: &str, name: &str| value(id, name).unwrap_or(0.0);
-        let mass = value("mass", "mass").unwrap_or(95.0);
-        let viscous = value("viscous-friction", "coefficient").unwrap_or(411.0);
-        let offset = value("offset", "force").unwrap_or(-3.0);
+        let mass = value("mass", "mass").unwrap_or(NOMINAL[0]);
+        let viscous = value("viscous-friction", "coefficient").unwrap_or(NOMINAL[1]);
+        let offset = value("offset", "force").unwrap_or(NOMINAL[2]);
         let (coulomb, presliding_m) = (effect("coulomb-friction", "force"), 1e-3 * effect("presliding", "distance"));
         let by_direction = effect("viscous-friction-by-direction", "forward_less_backward");
         let (stribeck, speed_m_s) = (effect("stribeck-friction", "force"), value("stribeck-friction", "speed").unwrap_or(0.01));
@@ -267,7 +219,7 @@ impl Plant for Emps {
                 + sine * (2.0 * PI * q / pitch_m).sin()
         };
         let forces: Vec<f64> = (first..(to + MARGIN).min(self.position_m.len())).map(force).collect();
-        Ok(low_pass(&forces, FORCE_HZ)[from - first..to - first].iter().step_by(EVERY).copied().collect())
+        Ok(low_pass(&forces, FORCE_HZ * INTERVAL_S)[from - first..to - first].iter().step_by(EVERY).copied().collect())
     }
 }
 

@@ -21,7 +21,7 @@ mod common;
 use std::error::Error;
 use std::path::Path;
 
-use common::{candidate, causes, column, constant, folder, found, free, print, shape};
+use common::{candidate, causes, column, constant, folder, found, free, one, print, shape};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
@@ -85,7 +85,18 @@ fn candidates() -> Vec<Candidate> {
             &[("plays", 0.0)],
             &[&[0.1, 0.5, 0.3], &[0.1, 1.5, 0.5]],
         ),
-        candidate("creep", "The displacement creeps.", vec![number("per_decade", "", 0.2, 0.002)], &[&[0.01]]),
+        one("creep", "The displacement creeps.", "per_decade", "", [-0.2, 0.2], 0.002),
+        one("saturation", "The amplifier's output is limited.", "lost_range", "V", [0.0, 2.0], 0.05),
+        one("delay", "The displacement follows late.", "time", "ms", [0.0, 40.0], 1.0),
+        one(
+            "remanence",
+            "A part of the displacement at the largest input so far stays (wake-up).",
+            "shift",
+            "µm",
+            [-20.0, 20.0],
+            0.3,
+        ),
+        one("drift", "The set-up drifts.", "rate", "µm/s", [-1.0, 1.0], 0.01),
         candidate(
             "field-dependent-gain",
             "The gain depends on the input.",
@@ -98,20 +109,6 @@ fn candidates() -> Vec<Candidate> {
             vec![number("slope", "1/mm", 20.0, 0.2), number("curvature", "1/mm²", 500.0, 5.0)],
             &[&[0.5, 0.0], &[0.0, 10.0]],
         ),
-        candidate(
-            "saturation",
-            "The amplifier's output is limited.",
-            vec![free("lost_range", "V", 0.0, [0.0, 2.0], 0.05)],
-            &[&[0.1]],
-        ),
-        candidate("delay", "The displacement follows late.", vec![free("time", "ms", 0.0, [0.0, 40.0], 1.0)], &[&[2.0]]),
-        candidate(
-            "remanence",
-            "A part of the displacement at the largest input so far stays (wake-up).",
-            vec![number("shift", "µm", 20.0, 0.3)],
-            &[&[1.0]],
-        ),
-        candidate("drift", "The set-up drifts.", vec![number("rate", "µm/s", 1.0, 0.01)], &[&[0.01]]),
     ]
 }
 
@@ -237,7 +234,7 @@ impl Plant for Stack {
     }
 }
 
-/// The diagnosis with the errors of groups of stretches (µm rms).
+/// The diagnosis and its causes.
 pub struct Found {
     /// The whole diagnosis.
     pub outcome: Outcome,

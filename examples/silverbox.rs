@@ -24,7 +24,7 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use common::{candidate, causes, column, constant, folder, found, free, print, residuals, rms, shape};
+use common::{candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
@@ -76,55 +76,25 @@ fn between_rows(input: &[f64]) -> Vec<f64> {
 }
 
 fn candidates() -> Vec<Candidate> {
-    let number = |name, unit, bound: f64, scale| vec![free(name, unit, 0.0, [-bound, bound], scale)];
+    let coefficient = |id, cause, unit, bound: f64, scale| one(id, cause, "coefficient", unit, [-bound, bound], scale);
     vec![
         constant("gain", "The output is scaled.", free("gain", "", 1.0, [0.5, 2.0], 0.02)),
         constant("frequency", "The circuit is faster or slower.", free("frequency", "Hz", 68.0, [40.0, 100.0], 1.0)),
         constant("damping-ratio", "The damping ratio differs.", free("ratio", "", 0.05, [0.005, 0.5], 0.005)),
         constant("offset", "The output has an offset.", free("output", "mV", 0.0, [-50.0, 50.0], 1.0)),
-        candidate("cubic-spring", "The spring hardens on both sides.", number("coefficient", "1/V²", 50.0, 0.3), &[&[1.0]]),
-        candidate("quadratic-spring", "The spring hardens on one side.", number("coefficient", "1/V", 5.0, 0.05), &[&[0.1]]),
-        candidate(
-            "fifth-order-spring",
-            "The spring hardens at the largest deflections.",
-            number("coefficient", "1/V⁴", 500.0, 3.0),
-            &[&[10.0]],
-        ),
-        candidate(
-            "quadratic-damping",
-            "Damping grows with the square of the speed.",
-            number("coefficient", "1/V", 10.0, 0.05),
-            &[&[0.1]],
-        ),
-        candidate("cubic-damping", "Damping grows with deflection.", number("coefficient", "1/V²", 200.0, 1.0), &[&[2.0]]),
-        candidate(
-            "dry-friction",
-            "Friction of constant size opposes motion.",
-            vec![free("force", "mV", 0.0, [0.0, 50.0], 0.2)],
-            &[&[0.5]],
-        ),
-        candidate(
-            "input-saturation",
-            "Large inputs are compressed (u − c u³).",
-            vec![free("coefficient", "1/V²", 0.0, [-20.0, 20.0], 0.3)],
-            &[&[1.0]],
-        ),
-        candidate(
-            "output-saturation",
-            "Large outputs are compressed (y − c y³).",
-            number("coefficient", "1/V²", 10.0, 0.1),
-            &[&[0.3]],
-        ),
-        candidate(
-            "output-curvature",
-            "The output's gain differs by side (y + c y²).",
-            number("coefficient", "1/V", 5.0, 0.03),
-            &[&[0.1]],
-        ),
-        candidate("delay", "The output follows late.", number("time", "ms", 4.0, 0.05), &[&[0.1]]),
+        coefficient("cubic-spring", "The spring hardens on both sides.", "1/V²", 50.0, 0.3),
+        coefficient("quadratic-spring", "The spring hardens on one side.", "1/V", 5.0, 0.05),
+        coefficient("fifth-order-spring", "The spring hardens at the largest deflections.", "1/V⁴", 500.0, 3.0),
+        coefficient("quadratic-damping", "Damping grows with the speed.", "1/V", 10.0, 0.05),
+        coefficient("cubic-damping", "Damping grows with the square of the deflection.", "1/V²", 200.0, 1.0),
+        one("dry-friction", "Friction of constant size opposes motion.", "force", "mV", [0.0, 50.0], 0.2),
+        coefficient("input-saturation", "Large inputs are compressed (u − c u³).", "1/V²", 20.0, 0.3),
+        coefficient("output-saturation", "Large outputs are compressed (y − c y³).", "1/V²", 10.0, 0.1),
+        coefficient("output-curvature", "The output's gain differs by side (y + c y²).", "1/V", 5.0, 0.03),
+        one("delay", "The output follows late.", "time", "ms", [-4.0, 4.0], 0.05),
         candidate(
             "creep",
-            "A slow part of the deflection follows by a lag.",
+            "A part of the output follows by a lag.",
             vec![free("share", "", 0.0, [-0.5, 0.5], 0.01), shape("time", "s", [0.005, 5.0], 0.05)],
             &[&[0.02, 0.02], &[0.02, 0.3]],
         ),
@@ -252,20 +222,24 @@ pub struct Found {
 /// # Errors
 /// If the data cannot be read or the model cannot be simulated.
 pub fn diagnosed(folder: &Path) -> Result<Found, Box<dyn Error>> {
-    let path = folder.join("silverbox.npz");
-    let plant = Silverbox::read(&path)?;
+    let plant = Silverbox::read(&folder.join("silverbox.npz"))?;
     let roles: Vec<Role> = (0..RUNS).map(|k| if k == 2 || k == 5 { Role::HeldOut } else { Role::Fit }).collect();
     let outcome = found(&plant, "Silverbox", &roles)?;
-    let judged = Silverbox::with_runs(&path, vec![JUDGED, ARROW, ARROW_INSIDE])?;
-    let errors = |model: &Model| -> Result<[f64; 3], DiagnoseError> {
-        let mut all = [0.0; 3];
-        for (run, error) in all.iter_mut().enumerate() {
-            *error = rms(&residuals(&judged, &Model { fine: true, ..model.clone() }, &[run])?.0[START..]);
-        }
-        Ok(all)
-    };
-    let (errors_mv, linear_errors_mv) = (errors(outcome.extended.model())?, errors(outcome.calibrated.model())?);
+    let (errors_mv, linear_errors_mv) = (errors(folder, outcome.extended.model())?, errors(folder, outcome.calibrated.model())?);
     Ok(Found { causes: causes(&outcome, &plant), errors_mv, linear_errors_mv, outcome })
+}
+
+/// Errors (mV rms) of a model on the last quarter of the multisines, on the arrow, and on what of the arrow needs no extrapolation.
+///
+/// # Errors
+/// If the data cannot be read or the model cannot be simulated.
+pub fn errors(folder: &Path, model: &Model) -> Result<[f64; 3], Box<dyn Error>> {
+    let judged = Silverbox::with_runs(&folder.join("silverbox.npz"), vec![JUDGED, ARROW, ARROW_INSIDE])?;
+    let mut all = [0.0; 3];
+    for (run, error) in all.iter_mut().enumerate() {
+        *error = rms(&residuals(&judged, &Model { fine: true, ..model.clone() }, &[run])?.0[START..]);
+    }
+    Ok(all)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

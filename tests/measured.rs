@@ -1,6 +1,8 @@
 //! The diagnosis on data that others measured, beside what they published: docs/measured.md. The data are no part of this repository; where
 //! `../shared/real` is absent, a test says so and passes.
 
+#![allow(clippy::duplicate_mod)] // every example is a program of its own
+
 use std::path::{Path, PathBuf};
 
 use sfers::diagnose::diagnosis::{Adopted, Part};

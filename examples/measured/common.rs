@@ -45,6 +45,18 @@ pub fn shape(name: &'static str, unit: &'static str, bounds: [f64; 2], scale: f6
     Free { name, unit, off: None, bounds, scale, inverse: false }
 }
 
+/// A cause with one parameter, which has no effect at 0; the search starts at `scale`.
+pub fn one(
+    id: &'static str,
+    cause: &'static str,
+    name: &'static str,
+    unit: &'static str,
+    bounds: [f64; 2],
+    scale: f64,
+) -> Candidate {
+    candidate(id, cause, vec![free(name, unit, 0.0, bounds, scale)], &[&[scale]])
+}
+
 /// A constant of the nominal model, `parameter` with its nominal value as the one without effect.
 pub fn constant(id: &'static str, cause: &'static str, parameter: Free) -> Candidate {
     let start = parameter.off.unwrap_or(parameter.bounds[0]) + parameter.scale;
