@@ -6,9 +6,10 @@ use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
 use super::dataset::{Bench, Dataset};
-use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
+use super::plant::{Candidate, FreeCurve, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::track::{ON_STEP, track};
+use super::visited::visited;
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
@@ -93,7 +94,6 @@ impl RobotPlant {
             starts.push(start);
             steps.push(step(&robot, &times));
         }
-        let candidates = candidates(&robot, dataset.markers.len());
         let plant = Self {
             markers: dataset.markers.iter().map(|marker| marker.position).collect(),
             channels: dataset.channel_names(),
@@ -103,10 +103,23 @@ impl RobotPlant {
             starts,
             durations: dataset.runs.iter().map(|run| run.times[run.times.len() - 1] - run.times[0]).collect(),
             steps,
-            candidates,
+            candidates: Vec::new(),
             bench: dataset.bench,
         };
-        plant.with_chosen_steps()
+        plant.with_chosen_steps().with_candidates()
+    }
+
+    /// Sets the candidates, free forms on the ranges that the runs visit.
+    fn with_candidates(mut self) -> Self {
+        let run = |run: usize| {
+            let table = self.commands[run].table(&vec![1.0; self.nuisances(run)], 0.0);
+            (table, self.steps[run], self.steps_of(run, self.steps[run]))
+        };
+        let runs: Vec<_> = (0..self.signals.len()).map(run).collect();
+        let bench = effects::Bench::new(&self.robot, self.markers.len());
+        // A nominal model that cannot be simulated is reported by the first prediction.
+        self.candidates = visited(&self.robot, &runs).map_or(Vec::new(), |visited| candidates(&bench, &visited));
+        self
     }
 
     /// Sets each run's time step to the longest that keeps its prediction within [`LARGEST_CHANGE`].
@@ -259,6 +272,16 @@ impl Plant for RobotPlant {
             _ => 0.5 / (resolution * resolution),
         };
         !candidate.is_constant || term.x.iter().any(|x| (x - 1.0).abs() > tolerance)
+    }
+
+    fn curve(&self, term: &Term) -> Option<FreeCurve> {
+        let Applied { effect, values } = self.applied(term).ok()?;
+        let shape = effect.shape.as_ref()?;
+        Some(FreeCurve { x: [shape.x, shape.x_unit], y: [shape.y, shape.y_unit], points: (shape.points)(&values) })
+    }
+
+    fn place_in_words(&self, place: &str) -> String {
+        effects::Place::ALL.iter().find(|known| known.name() == place).map_or_else(|| place.to_owned(), |known| known.words().into())
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
