@@ -25,7 +25,7 @@ use std::error::Error;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::path::Path;
 
-use common::{candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
+use common::{at, candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
 use filter::{central_differences, low_pass};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
@@ -63,38 +63,62 @@ pub struct Emps {
 fn candidates() -> Vec<Candidate> {
     let part = |name| free(name, "N", 0.0, [-20.0, 20.0], 1.0);
     let pitches: [&[f64]; 4] = [&[1.0, 1.0, 5.0], &[1.0, 1.0, 10.0], &[1.0, 1.0, 20.0], &[1.0, 1.0, 40.0]];
-    vec![
+    let constants = vec![
         constant("mass", "The moved mass differs.", free("mass", "kg", NOMINAL[0], [20.0, 300.0], 5.0)),
         constant("viscous-friction", "Viscous friction differs.", free("coefficient", "N·s/m", NOMINAL[1], [0.0, 1000.0], 20.0)),
         // A Coulomb friction that differs by direction is a symmetric one and an offset.
         constant("offset", "The force has another offset.", free("force", "N", NOMINAL[2], [-50.0, 50.0], 1.0)),
-        one("coulomb-friction", "Coulomb friction.", "force", "N", [0.0, 100.0], 5.0),
-        one(
-            "viscous-friction-by-direction",
-            "Viscous friction differs by direction.",
-            "forward_less_backward",
-            "N·s/m",
-            [-400.0, 400.0],
-            20.0,
+    ];
+    [
+        constants,
+        at(
+            "force-of-speed",
+            [
+                one("coulomb-friction", "Coulomb friction.", "force", "N", [0.0, 100.0], 5.0),
+                one(
+                    "viscous-friction-by-direction",
+                    "Viscous friction differs by direction.",
+                    "forward_less_backward",
+                    "N·s/m",
+                    [-400.0, 400.0],
+                    20.0,
+                ),
+                candidate(
+                    "stribeck-friction",
+                    "Coulomb friction changes at low speed (Stribeck).",
+                    vec![free("force", "N", 0.0, [-60.0, 60.0], 2.0), shape("speed", "m/s", [1e-3, 0.1], 5e-3)],
+                    &[&[2.0, 5e-3], &[2.0, 0.02]],
+                ),
+                one(
+                    "quadratic-drag",
+                    "Drag grows with the square of the speed.",
+                    "coefficient",
+                    "N·s²/m²",
+                    [-3000.0, 3000.0],
+                    100.0,
+                ),
+            ],
         ),
-        candidate(
-            "stribeck-friction",
-            "Coulomb friction changes at low speed (Stribeck).",
-            vec![free("force", "N", 0.0, [-60.0, 60.0], 2.0), shape("speed", "m/s", [1e-3, 0.1], 5e-3)],
-            &[&[2.0, 5e-3], &[2.0, 0.02]],
+        at(
+            "memory-of-friction",
+            [one("presliding", "Friction grows over a distance after a reversal (Dahl).", "distance", "mm", [0.0, 2.0], 0.02)],
         ),
-        one("presliding", "Friction grows over a distance after a reversal (Dahl).", "distance", "mm", [0.0, 2.0], 0.02),
-        one("quadratic-drag", "Drag grows with the square of the speed.", "coefficient", "N·s²/m²", [-3000.0, 3000.0], 100.0),
-        one("spring", "The force depends on position.", "stiffness", "N/m", [-300.0, 300.0], 5.0),
-        one("wear", "Viscous friction depends on position.", "slope", "N·s/m²", [-3000.0, 3000.0], 50.0),
-        candidate(
-            "ripple",
-            "The force repeats with the turns of the screw or of the motor (cogging).",
-            vec![part("cosine"), part("sine"), shape("pitch", "mm", [2.0, 60.0], 0.1)],
-            &pitches,
+        at(
+            "force-of-position",
+            [
+                one("spring", "The force depends on position.", "stiffness", "N/m", [-300.0, 300.0], 5.0),
+                one("wear", "Viscous friction depends on position.", "slope", "N·s/m²", [-3000.0, 3000.0], 50.0),
+                candidate(
+                    "ripple",
+                    "The force repeats with the turns of the screw or of the motor (cogging).",
+                    vec![part("cosine"), part("sine"), shape("pitch", "mm", [2.0, 60.0], 0.1)],
+                    &pitches,
+                ),
+            ],
         ),
-        one("delay", "The force follows its command late.", "time", "ms", [-10.0, 10.0], 0.5),
+        at("command", [one("delay", "The force follows its command late.", "time", "ms", [-10.0, 10.0], 0.5)]),
     ]
+    .concat()
 }
 
 impl Emps {

@@ -21,7 +21,7 @@ mod common;
 use std::error::Error;
 use std::path::Path;
 
-use common::{candidate, causes, column, constant, folder, found, free, one, print, shape};
+use common::{at, candidate, causes, column, constant, folder, found, free, one, print, shape};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
@@ -70,46 +70,71 @@ fn candidates() -> Vec<Candidate> {
         fixed: fixed.to_vec(),
         ..candidate("hysteresis", "The displacement depends on the inputs before.", parameters, starts)
     };
-    vec![
+    let constants = vec![
         constant("gain", "Displacement per volt differs.", free("gain", "µm/V", 13.0, [5.0, 30.0], 0.3)),
         constant("lag", "The amplifier or sensor is faster or slower.", free("time", "ms", 10.0, [0.5, 100.0], 1.0)),
         constant("zero", "The sensor's zero in the first session.", free("zero", "µm", -121.0, [-200.0, 0.0], 1.0)),
         constant("zero-of-session-2", "The sensor's zero moved between sessions.", number("shift", "µm", 50.0, 1.0)),
-        plays(
-            vec![share(), shape("decay", "1/V", [-3.0, 5.0], 0.2)],
-            &[("plays", PLAYS as f64), ("from_zero", 1.0)],
-            &[&[0.1, 0.5], &[0.1, 2.0]],
+    ];
+    [
+        constants,
+        at(
+            "memory-of-the-input",
+            [
+                plays(
+                    vec![share(), shape("decay", "1/V", [-3.0, 5.0], 0.2)],
+                    &[("plays", PLAYS as f64), ("from_zero", 1.0)],
+                    &[&[0.1, 0.5], &[0.1, 2.0]],
+                ),
+                plays(
+                    vec![share(), shape("beta", "1/V", [0.05, 10.0], 0.1), shape("gamma", "1/V", [-5.0, 5.0], 0.1)],
+                    &[("plays", 0.0)],
+                    &[&[0.1, 0.5, 0.3], &[0.1, 1.5, 0.5]],
+                ),
+                one(
+                    "remanence",
+                    "A part of the displacement at the largest input so far stays (wake-up).",
+                    "shift",
+                    "µm",
+                    [-20.0, 20.0],
+                    0.3,
+                ),
+            ],
         ),
-        plays(
-            vec![share(), shape("beta", "1/V", [0.05, 10.0], 0.1), shape("gamma", "1/V", [-5.0, 5.0], 0.1)],
-            &[("plays", 0.0)],
-            &[&[0.1, 0.5, 0.3], &[0.1, 1.5, 0.5]],
+        at(
+            "memory-in-time",
+            [
+                one("creep", "The displacement creeps.", "per_decade", "", [-0.2, 0.2], 0.002),
+                one("drift", "The set-up drifts.", "rate", "µm/s", [-1.0, 1.0], 0.01),
+            ],
         ),
-        one("creep", "The displacement creeps.", "per_decade", "", [-0.2, 0.2], 0.002),
-        one("saturation", "The amplifier's output is limited.", "lost_range", "V", [0.0, 2.0], 0.05),
-        one("delay", "The displacement follows late.", "time", "ms", [0.0, 40.0], 1.0),
-        one(
-            "remanence",
-            "A part of the displacement at the largest input so far stays (wake-up).",
-            "shift",
-            "µm",
-            [-20.0, 20.0],
-            0.3,
+        at(
+            "gain",
+            [candidate(
+                "field-dependent-gain",
+                "The gain depends on the input.",
+                vec![number("slope", "1/V", 0.3, 0.005), number("curvature", "1/V²", 0.1, 0.002)],
+                &[&[0.01, 0.0], &[0.0, 0.01]],
+            )],
         ),
-        one("drift", "The set-up drifts.", "rate", "µm/s", [-1.0, 1.0], 0.01),
-        candidate(
-            "field-dependent-gain",
-            "The gain depends on the input.",
-            vec![number("slope", "1/V", 0.3, 0.005), number("curvature", "1/V²", 0.1, 0.002)],
-            &[&[0.01, 0.0], &[0.0, 0.01]],
+        at(
+            "sensor",
+            [candidate(
+                "sensor-curvature",
+                "The sensor's gain depends on displacement.",
+                vec![number("slope", "1/mm", 20.0, 0.2), number("curvature", "1/mm²", 500.0, 5.0)],
+                &[&[0.5, 0.0], &[0.0, 10.0]],
+            )],
         ),
-        candidate(
-            "sensor-curvature",
-            "The sensor's gain depends on displacement.",
-            vec![number("slope", "1/mm", 20.0, 0.2), number("curvature", "1/mm²", 500.0, 5.0)],
-            &[&[0.5, 0.0], &[0.0, 10.0]],
+        at(
+            "amplifier",
+            [
+                one("saturation", "The amplifier's output is limited.", "lost_range", "V", [0.0, 2.0], 0.05),
+                one("delay", "The displacement follows late.", "time", "ms", [0.0, 40.0], 1.0),
+            ],
         ),
     ]
+    .concat()
 }
 
 /// Standard deviation about a straight line.

@@ -24,7 +24,7 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use common::{candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
+use common::{at, candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
@@ -77,28 +77,52 @@ fn between_rows(input: &[f64]) -> Vec<f64> {
 
 fn candidates() -> Vec<Candidate> {
     let coefficient = |id, cause, unit, bound: f64, scale| one(id, cause, "coefficient", unit, [-bound, bound], scale);
-    vec![
+    let constants = vec![
         constant("gain", "The output is scaled.", free("gain", "", 1.0, [0.5, 2.0], 0.02)),
         constant("frequency", "The circuit is faster or slower.", free("frequency", "Hz", 68.0, [40.0, 100.0], 1.0)),
         constant("damping-ratio", "The damping ratio differs.", free("ratio", "", 0.05, [0.005, 0.5], 0.005)),
         constant("offset", "The output has an offset.", free("output", "mV", 0.0, [-50.0, 50.0], 1.0)),
-        coefficient("cubic-spring", "The spring hardens on both sides.", "1/V²", 50.0, 0.3),
-        coefficient("quadratic-spring", "The spring hardens on one side.", "1/V", 5.0, 0.05),
-        coefficient("fifth-order-spring", "The spring hardens at the largest deflections.", "1/V⁴", 500.0, 3.0),
-        coefficient("quadratic-damping", "Damping grows with the speed.", "1/V", 10.0, 0.05),
-        coefficient("cubic-damping", "Damping grows with the square of the deflection.", "1/V²", 200.0, 1.0),
-        one("dry-friction", "Friction of constant size opposes motion.", "force", "mV", [0.0, 50.0], 0.2),
-        coefficient("input-saturation", "Large inputs are compressed (u − c u³).", "1/V²", 20.0, 0.3),
-        coefficient("output-saturation", "Large outputs are compressed (y − c y³).", "1/V²", 10.0, 0.1),
-        coefficient("output-curvature", "The output's gain differs by side (y + c y²).", "1/V", 5.0, 0.03),
-        one("delay", "The output follows late.", "time", "ms", [-4.0, 4.0], 0.05),
-        candidate(
-            "creep",
-            "A part of the output follows by a lag.",
-            vec![free("share", "", 0.0, [-0.5, 0.5], 0.01), shape("time", "s", [0.005, 5.0], 0.05)],
-            &[&[0.02, 0.02], &[0.02, 0.3]],
+    ];
+    [
+        constants,
+        at(
+            "spring",
+            [
+                coefficient("cubic-spring", "The spring hardens on both sides.", "1/V²", 50.0, 0.3),
+                coefficient("quadratic-spring", "The spring hardens on one side.", "1/V", 5.0, 0.05),
+                coefficient("fifth-order-spring", "The spring hardens at the largest deflections.", "1/V⁴", 500.0, 3.0),
+            ],
+        ),
+        at(
+            "damper",
+            [
+                coefficient("quadratic-damping", "Damping grows with the speed.", "1/V", 10.0, 0.05),
+                coefficient("cubic-damping", "Damping grows with the square of the deflection.", "1/V²", 200.0, 1.0),
+                one("dry-friction", "Friction of constant size opposes motion.", "force", "mV", [0.0, 50.0], 0.2),
+            ],
+        ),
+        at("input", [coefficient("input-saturation", "Large inputs are compressed (u − c u³).", "1/V²", 20.0, 0.3)]),
+        at(
+            "output",
+            [
+                coefficient("output-saturation", "Large outputs are compressed (y − c y³).", "1/V²", 10.0, 0.1),
+                coefficient("output-curvature", "The output's gain differs by side (y + c y²).", "1/V", 5.0, 0.03),
+            ],
+        ),
+        at(
+            "memory",
+            [
+                one("delay", "The output follows late.", "time", "ms", [-4.0, 4.0], 0.05),
+                candidate(
+                    "creep",
+                    "A part of the output follows by a lag.",
+                    vec![free("share", "", 0.0, [-0.5, 0.5], 0.01), shape("time", "s", [0.005, 5.0], 0.05)],
+                    &[&[0.02, 0.02], &[0.02, 0.3]],
+                ),
+            ],
         ),
     ]
+    .concat()
 }
 
 impl Silverbox {

@@ -57,6 +57,11 @@ pub fn one(
     candidate(id, cause, vec![free(name, unit, 0.0, bounds, scale)], &[&[scale]])
 }
 
+/// Causes that act at one place of the model: rivals.
+pub fn at<const N: usize>(place: &'static str, causes: [Candidate; N]) -> Vec<Candidate> {
+    causes.into_iter().map(|cause| Candidate { places: vec![place], ..cause }).collect()
+}
+
 /// A constant of the nominal model, `parameter` with its nominal value as the one without effect.
 pub fn constant(id: &'static str, cause: &'static str, parameter: Free) -> Candidate {
     let start = parameter.off.unwrap_or(parameter.bounds[0]) + parameter.scale;
@@ -69,6 +74,8 @@ pub fn candidate(id: &'static str, cause: &'static str, parameters: Vec<Free>, s
         id,
         kind: "physics",
         cause,
+        places: vec![id],
+        is_free_form: false,
         is_constant: false,
         parameters,
         fixed: Vec::new(),
