@@ -25,7 +25,7 @@ use std::error::Error;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::path::Path;
 
-use common::{at, candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
+use common::{at, candidate, column, constant, folder, found, free, one, print, residuals, rms, shape};
 use filter::{central_differences, low_pass};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
@@ -251,8 +251,6 @@ impl Plant for Emps {
 pub struct Found {
     /// The whole diagnosis.
     pub outcome: Outcome,
-    /// Ids of the adopted causes.
-    pub causes: Vec<String>,
     /// On all strokes of the record (–).
     pub error: f64,
     /// On all strokes of the record with pulses (–).
@@ -275,7 +273,7 @@ pub fn diagnosed(folder: &Path) -> Result<Found, Box<dyn Error>> {
     let [error, error_with_pulses] = errors(model)?;
     let [symmetric, by_direction] = published(&emps.candidates);
     let published = [errors(&symmetric)?, errors(&by_direction)?];
-    Ok(Found { causes: causes(&outcome, &emps), error, error_with_pulses, published, outcome })
+    Ok(Found { error, error_with_pulses, published, outcome })
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

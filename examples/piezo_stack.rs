@@ -21,7 +21,7 @@ mod common;
 use std::error::Error;
 use std::path::Path;
 
-use common::{at, candidate, causes, column, constant, folder, found, free, one, print, shape};
+use common::{at, candidate, column, constant, folder, found, free, one, print, shape};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
@@ -259,27 +259,17 @@ impl Plant for Stack {
     }
 }
 
-/// The diagnosis and its causes.
-pub struct Found {
-    /// The whole diagnosis.
-    pub outcome: Outcome,
-    /// Ids of the adopted causes.
-    pub causes: Vec<String>,
-}
-
 /// Diagnoses both sessions.
 ///
 /// # Errors
 /// If the data cannot be read or the model cannot be simulated.
-pub fn diagnosed(folder: &Path) -> Result<Found, Box<dyn Error>> {
+pub fn diagnosed(folder: &Path) -> Result<Outcome, Box<dyn Error>> {
     let plant = Stack::read(folder)?;
     let roles: Vec<Role> = STRETCHES.iter().map(|stretch| stretch.4).collect();
-    let outcome = found(&plant, "piezo stack", &roles)?;
-    Ok(Found { causes: causes(&outcome, &plant), outcome })
+    Ok(found(&plant, "piezo stack", &roles)?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let Some(folder) = folder("piezo-stack") else { return Ok(()) };
-    let found = diagnosed(&folder)?;
-    print(&found.outcome, "µm")
+    print(&diagnosed(&folder)?, "µm")
 }

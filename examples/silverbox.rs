@@ -24,7 +24,7 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use common::{at, candidate, causes, column, constant, folder, found, free, one, print, residuals, rms, shape};
+use common::{at, candidate, column, constant, folder, found, free, one, print, residuals, rms, shape};
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::dataset::Role;
 use sfers::diagnose::pipeline::Outcome;
@@ -233,8 +233,6 @@ impl Plant for Silverbox {
 pub struct Found {
     /// The whole diagnosis.
     pub outcome: Outcome,
-    /// Ids of the adopted causes.
-    pub causes: Vec<String>,
     /// Last quarter of the multisines, whole arrow, arrow without extrapolation.
     pub errors_mv: [f64; 3],
     /// The same of the linear model with re-tuned constants.
@@ -250,7 +248,7 @@ pub fn diagnosed(folder: &Path) -> Result<Found, Box<dyn Error>> {
     let roles: Vec<Role> = (0..RUNS).map(|k| if k == 2 || k == 5 { Role::HeldOut } else { Role::Fit }).collect();
     let outcome = found(&plant, "Silverbox", &roles)?;
     let (errors_mv, linear_errors_mv) = (errors(folder, outcome.extended.model())?, errors(folder, outcome.calibrated.model())?);
-    Ok(Found { causes: causes(&outcome, &plant), errors_mv, linear_errors_mv, outcome })
+    Ok(Found { errors_mv, linear_errors_mv, outcome })
 }
 
 /// Errors (mV rms) of a model on the last quarter of the multisines, on the arrow, and on what of the arrow needs no extrapolation.

@@ -71,9 +71,9 @@ fn the_cubic_spring_of_the_silverbox_is_named() {
 #[ignore = "slow: run by scripts/test.sh"]
 fn hysteresis_of_a_piezo_stack_is_named() {
     let Some(folder) = data("piezo-stack", "piezo stack") else { return };
-    let found = piezo_stack::diagnosed(&folder).unwrap();
-    cause(&found.outcome, "hysteresis");
-    let d = &found.outcome.diagnosis;
+    let outcome = piezo_stack::diagnosed(&folder).unwrap();
+    cause(&outcome, "hysteresis");
+    let d = &outcome.diagnosis;
     // Seen: 0.174 µm of 45 µm, a third of the linear model's 0.587 µm; the noise is 0.065 µm.
     let [linear, extended] = [d.calibrated.rmse_heldout_mm, d.extended.rmse_heldout_mm];
     assert!(extended < 0.2 && extended < 0.4 * linear, "{extended} of {linear} µm");

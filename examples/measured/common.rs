@@ -126,12 +126,6 @@ pub fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Ids of the adopted causes, constants of the nominal model left out.
-pub fn causes(outcome: &Outcome, plant: &dyn Plant) -> Vec<String> {
-    let is_cause = |id: &str| plant.candidates().iter().any(|c| c.id == id && !c.is_constant);
-    outcome.diagnosis.effects.iter().map(|effect| effect.id.clone()).filter(|id| is_cause(id)).collect()
-}
-
 /// Prints the verdict, the parameters, the errors of each run, the ranking and the residual tests that fail; writes all of it as JSON to the second
 /// argument of the command, if there is one.
 ///
