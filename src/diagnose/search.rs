@@ -501,7 +501,10 @@ impl Search<'_> {
             of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
         };
         let judged = |scored: &Scored| self.judged(scored);
-        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false), best(&judged, true)];
+        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false)];
+        // A free form that is no better than a name loses anyway.
+        let is_ahead = |free: &usize| ahead[0].is_none_or(|named| judged(&trials[*free].scored) < judged(&trials[named].scored));
+        ahead.push(best(&judged, true).filter(is_ahead));
         ahead.dedup();
         for index in ahead.into_iter().flatten() {
             let model = trials[index].scored.model().clone();
@@ -546,7 +549,9 @@ impl Search<'_> {
                 first.get_or_insert(trials);
                 break;
             };
-            best = self.settle(worthy)?;
+            // The discretisation is refined before another cause could take its error.
+            let settled = self.settle(worthy)?;
+            best = self.resolve(settled)?;
             if first.is_none() {
                 first = Some(trials);
             }

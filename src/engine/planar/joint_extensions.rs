@@ -2,8 +2,8 @@
 //! and drag in air.
 //!
 //! The step stays one problem that is linear in the mean rates u: a joint's extra torque e is put as e* − s (u − u*), about the rate u* of the
-//! step before. For softening, curves of the deviation and springs with a limit s is the tangent, which errs by the square of what changes in a step.
-//! For dry friction, τ_c tanh(u/ω), and curves of the rate the step is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
+//! step before. For softening, curves and springs with a limit s is the tangent, which errs by the square of what changes in a step. For dry friction,
+//! τ_c tanh(u/ω), the step is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
 //! with the secant −e*/u*, whose quadratic potential majorises that of friction, so that a repetition can only lower the cost. The Prony chain is linear and
 //! exact over a step.
 
@@ -89,7 +89,7 @@ impl JointExtensions {
     }
 
     pub(super) fn is_repeated(&self) -> bool {
-        self.friction != 0.0
+        self.extensions.dry_friction != 0.0
     }
 
     /// Whether the torque depends on the elastic deviation alone.
@@ -169,7 +169,7 @@ impl JointExtensions {
     fn friction(&self, lane: usize, u: f64, turned_back: bool) -> (f64, f64) {
         let [moment, slope] = self.resistance(lane, u);
         // A curve of the rate is smooth.
-        if (self.extensions.dry_friction == 0.0 || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
+        if (!self.is_repeated() || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
             (slope, slope * u - moment)
         } else {
             (if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0)
@@ -222,7 +222,7 @@ impl JointExtensions {
         for (k, quad) in quads.iter().enumerate() {
             let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
             before = quad.mean[0].level(1);
-            if self.friction != 0.0 {
+            if self.is_repeated() {
                 for lane in 0..4 {
                     let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
                     let (slope, rest) = self.friction(lane, before, self.turned_back[k][lane]);
