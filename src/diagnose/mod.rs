@@ -39,6 +39,7 @@ pub mod residual_tests;
 pub mod robot;
 mod run_csv;
 pub mod search;
+mod stability;
 mod summary;
 mod track;
 mod visited;

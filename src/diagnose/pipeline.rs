@@ -11,7 +11,8 @@ use super::naming::{self, Naming};
 use super::plant::{FreeCurve, Model, Plant, Signal, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
-use super::summary::{failing, summary};
+use super::stability::stability;
+use super::summary::{Findings, failing, summary};
 
 /// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
 const SEARCH_RESOLUTION: f64 = 10.0;
@@ -193,14 +194,16 @@ pub fn diagnose(
         complete: verdict != Verdict::Unexplained && failed.is_none() && !has_rest,
         summary: summary(
             verdict,
-            &effects,
-            &|place| plant.place_in_words(place),
-            unexplained_fraction,
-            has_rest,
-            insufficient.as_deref(),
-            best.model().resolution,
-            refined,
-            failed.as_deref(),
+            &Findings {
+                effects: &effects,
+                place_in_words: &|place| plant.place_in_words(place),
+                left: unexplained_fraction,
+                has_rest,
+                insufficient: insufficient.as_deref(),
+                resolution: best.model().resolution,
+                refined,
+                failing: failed.as_deref(),
+            },
         ),
         // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
         unexplained_fraction: if is_unexplained || has_rest {
@@ -555,7 +558,7 @@ fn adopted(
         tied_with,
         share: (chi2(&without) - chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64,
         role: Part::Cause,
-        stability: None,
+        stability: stability(search, best, &without, index)?,
         curve: curve(search, best, index, found),
         nearest: Vec::new(),
         gain_heldout: gain(search, best, &without),

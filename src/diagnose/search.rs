@@ -16,7 +16,7 @@ use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
-const LEAST_GAIN: f64 = 0.03;
+pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
 /// right; ...
 const LEAST_SHARE: f64 = 0.004;
@@ -136,9 +136,11 @@ pub struct Screened {
     /// Every start of every candidate: its linear estimate of the fall of χ², and the model to fit from; best first.
     pub ranked: Vec<(f64, Model)>,
     /// Every start with its change of the residuals, orthogonal to the model's tangents.
-    columns: Vec<(Term, DVector<f64>)>,
+    pub(super) columns: Vec<(Term, DVector<f64>)>,
     /// The residuals, orthogonal to the model's tangents.
-    rest: DVector<f64>,
+    pub(super) rest: DVector<f64>,
+    /// The model's tangents, orthonormal.
+    pub(super) tangents: Vec<DVector<f64>>,
 }
 
 impl Search<'_> {
@@ -342,11 +344,11 @@ impl Search<'_> {
             .map(|term| {
                 let model = with(base, [term.clone()]);
                 let residuals = self.estimator.residuals_of(&model, &runs).ok()?;
-                let column = without(&own, &(DVector::from_vec(residuals.concat()) - &plain));
+                let column = without_directions(&own, &(DVector::from_vec(residuals.concat()) - &plain));
                 (column.norm_squared() > 1e-12).then_some(column)
             })
             .collect();
-        let rest = without(&own, &plain);
+        let rest = without_directions(&own, &plain);
         let mut ranked = Vec::new();
         let columns: Vec<(Term, DVector<f64>)> =
             starts.into_iter().zip(columns).filter_map(|(term, column)| Some((term, column?))).collect();
@@ -361,7 +363,7 @@ impl Search<'_> {
             ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(Screened { ranked, columns, rest })
+        Ok(Screened { ranked, columns, rest, tangents: own })
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -397,7 +399,7 @@ impl Search<'_> {
     /// The two screened causes that would lower χ² most together, if by more than twice what the best does alone: other pairs are found one cause
     /// at a time.
     fn pair(&self, base: &Model, screened: &Screened) -> Option<Model> {
-        let Screened { ranked, columns, rest } = screened;
+        let Screened { ranked, columns, rest, .. } = screened;
         let mut least = 2.0 * ranked.first().map_or(0.0, |(gain, _)| *gain);
         let sizes: Vec<[f64; 2]> = columns.iter().map(|(_, u)| [u.norm_squared(), u.dot(rest)]).collect();
         let mut pair = None;
@@ -427,7 +429,7 @@ impl Search<'_> {
 
     /// A start moved along the line from its off value, and true if the bounds allow the direction: a cause of one sign that the data need with the
     /// other one is not moved.
-    fn moved(&self, start: &Term, along: f64) -> (Term, bool) {
+    pub(super) fn moved(&self, start: &Term, along: f64) -> (Term, bool) {
         let parameters = &self.estimator.plant.candidates()[start.candidate].parameters;
         if parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1])) && along < 0.05 {
             return (start.clone(), false);
@@ -452,7 +454,7 @@ impl Search<'_> {
         let mut orthogonal: Vec<DVector<f64>> = Vec::new();
         for column in columns {
             let size = column.norm();
-            let rest = without(&orthogonal, &column);
+            let rest = without_directions(&orthogonal, &column);
             let left = rest.norm();
             if left > 1e-6 * size && left > 0.0 {
                 orthogonal.push(rest / left);
@@ -720,7 +722,7 @@ fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
 }
 
 /// The part of a vector that is orthogonal to orthonormal ones.
-fn without(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
+pub(super) fn without_directions(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
     let mut rest = vector.clone();
     for direction in unit {
         let along = direction.dot(&rest);

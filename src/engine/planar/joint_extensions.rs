@@ -301,5 +301,5 @@ fn prony(step: f64) -> [[f64; 4]; LOSS_TIMES.len()] {
 
 /// The sign of a joint's angle in a lane: angles count outwards from the root, and on the right arm that is the opposite sense.
 fn sense(lane: usize) -> f64 {
-    if lane % 2 == 0 { 1.0 } else { -1.0 }
+    if lane.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
