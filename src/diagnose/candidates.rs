@@ -56,7 +56,8 @@ fn push(all: &mut Vec<Candidate>, effect: &'static Effect, form: &'static Form, 
         .collect();
     let ranges = effect.parameters.iter().filter_map(|p| Some((p.name, visited.given(p.name)?)));
     let given: Vec<(&'static str, f64)> = if effect.shape.is_some() { ranges.collect() } else { form.given.to_vec() };
-    let is_of_one_actuator = effect.parameters.iter().any(|p| p.name == "actuator") && fitted("actuator").is_none();
+    let is_of_one_actuator =
+        effect.parameters.iter().any(|p| p.name == "actuator" && p.default.is_none()) && fitted("actuator").is_none();
     let actuators = if is_of_one_actuator { 1..=bench.actuators } else { 0..=0 };
     for actuator in actuators {
         let which = (actuator > 0).then_some(("actuator", actuator as f64));
