@@ -79,7 +79,7 @@ pub fn diagnose(
     let resolutions = plant.resolutions();
     let nominal_resolution = resolutions.first().copied().unwrap_or(1.0);
     let start = resolutions.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
-    let mut search = Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0 };
+    let mut search = Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY };
 
     progress("the nominal model");
     let nominal = search.fitted(&Model::new(Vec::new(), nominal_resolution, true))?;
@@ -367,10 +367,6 @@ struct Causes {
 /// the way, and the less costly model counts.
 fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
-    let cost = |causes: &Causes, search: &Search| {
-        let count = search.estimator.count(&search.split.all()) as f64;
-        causes.best.total() + causes.best.freedom() as f64 * count.ln()
-    };
     search.estimator.only_given_faults = true;
     let without = search.estimator.spread(calibrated.model(), &[])?;
     let has_faults = calibrated.model().spread != without;
@@ -380,15 +376,18 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
     } else {
         calibrated.clone()
     };
+    // Two causes that cost more than the bench's faults alone are not what is missing.
+    search.limit = if has_faults { search.cost(calibrated) } else { f64::INFINITY };
     let mut causes = select(search, &start, is_insufficient)?;
-    if has_faults && causes.best.model().spread != without {
+    search.limit = f64::INFINITY;
+    if has_faults && (causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated)) {
         (search.progress)("causes with faults of the bench in the way");
-        let plain = cost(&causes, search);
+        let plain = search.cost(&causes.best);
         let after = (search.estimator.state(), search.split.clone());
         search.estimator.restore(before.0);
         search.split = before.1;
         let other = select(search, calibrated, is_insufficient)?;
-        if cost(&other, search) <= plain + LEAST_COST {
+        if search.cost(&other.best) <= plain + LEAST_COST {
             causes = other;
         } else {
             search.estimator.restore(after.0);
@@ -432,6 +431,18 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     } else {
         search.forward(calibrated.clone())?
     };
+    if search.is_given_up(&best) {
+        search.estimator.only_given_faults = false;
+        return Ok(Causes {
+            coarse_total: best.total(),
+            best,
+            trials,
+            replaced: Vec::new(),
+            spikes: 0,
+            open: f64::INFINITY,
+            nearest: Vec::new(),
+        });
+    }
     let spikes = search.estimator.leave_out_spikes(best.model())?;
     if spikes > 0 {
         best = search.settle(best)?;

@@ -118,6 +118,8 @@ pub struct Search<'a> {
     pub split: Split,
     /// χ² per value above 1 of re-tuned constants on the held-out runs, set by [`calibrated`](Self::calibrated).
     pub unexplained: f64,
+    /// Models with two causes that cost more are given up; infinite for none.
+    pub limit: f64,
     /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
@@ -147,6 +149,17 @@ impl Search<'_> {
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
         self.estimator.plant.candidates()[candidate].id
+    }
+
+    /// Cost of a model on all runs, with ln N for each coordinate.
+    pub fn cost(&self, scored: &Scored) -> f64 {
+        scored.total() + scored.freedom() as f64 * (self.estimator.count(&self.split.all()) as f64).ln()
+    }
+
+    /// True if a model has two causes and costs more than the limit.
+    pub fn is_given_up(&self, scored: &Scored) -> bool {
+        let causes = scored.model().terms.iter().filter(|term| !self.candidate(term).is_constant).count();
+        causes >= 2 && self.cost(scored) > self.limit
     }
 
     /// Scores a fitted model on all runs.
@@ -557,6 +570,9 @@ impl Search<'_> {
             if first.is_none() {
                 first = Some(trials);
             }
+            if self.is_given_up(&best) {
+                break;
+            }
         }
         Ok((best, first.unwrap_or_default()))
     }
@@ -923,7 +939,13 @@ mod tests {
     fn found(plant: &Waves) -> Vec<&'static str> {
         let progress = |_: &str| {};
         let estimator = Estimator::new(plant);
-        let mut search = Search { estimator, split: split(plant, &[Role::Auto; 6]), unexplained: 0.0, progress: &progress };
+        let mut search = Search {
+            estimator,
+            split: split(plant, &[Role::Auto; 6]),
+            unexplained: 0.0,
+            limit: f64::INFINITY,
+            progress: &progress,
+        };
         let plain = search.calibrated(1.0).unwrap();
         let (best, _) = search.forward(plain).unwrap();
         best.model().terms.iter().map(|term| search.id(term.candidate)).collect()
