@@ -154,7 +154,8 @@ pub fn diagnose(
         (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
         _ => None,
     };
-    let unexplained = if is_unexplained || (left > LEFT_OVER && unexplained_fraction > LEFT_SHARE) {
+    let has_rest = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE;
+    let unexplained = if is_unexplained || has_rest {
         super::residual_tests::describe(plant, &search.split, &search.estimator.used, &best.residuals)
     } else {
         Vec::new()
@@ -186,7 +187,6 @@ pub fn diagnose(
     quality.extend(faults::remarks(&bench, noise, plant));
     let extended = stage(&best, parameters(&best, &intervals));
     let failed = failing(&extended.residual_tests);
-    let has_rest = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE;
     let diagnosis = Diagnosis {
         schema: 2,
         dataset: name.to_owned(),
