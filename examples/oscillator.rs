@@ -79,6 +79,7 @@ impl Oscillator {
             cause,
             places: vec![id],
             is_free_form: false,
+            is_variant: false,
             is_constant,
             parameters: vec![Free { name, unit: "", off: Some(off), bounds, scale, inverse: false }],
             fixed: Vec::new(),

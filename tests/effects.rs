@@ -337,6 +337,15 @@ fn free_forms_hold_the_named_laws_of_their_places() {
     let fifths = |of: &dyn Fn(f64) -> f64| [1, 2, 3, 4, 5].map(|k| of(0.2 * f64::from(k)));
     // A tenth more than the voltage.
     let [a, b, c, d, e] = fifths(&|share| -100.0 * share);
+    // At 10 Hz, 1/(2π·10 Hz) s, as without an exponent.
+    let share = |time: f64| 0.05 * (time * 20.0 * std::f64::consts::PI).sqrt();
+    let loss = [
+        ("share_1", share(1e-4)),
+        ("share_2", share(1e-3)),
+        ("share_3", share(1e-2)),
+        ("share_4", share(1e-1)),
+        ("share_5", share(1.0)),
+    ];
     let line = [
         ("low_v", -1000.0),
         ("high_v", 0.0),
@@ -346,7 +355,7 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         ("below_4_v", d),
         ("below_5_v", e),
     ];
-    let cases: [(Effects, Effects); 6] = [
+    let cases: [(Effects, Effects); 9] = [
         (
             &[(
                 "free-joint-memory",
@@ -357,15 +366,14 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         (&[("free-drag", &[("quadratic", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0)])]),
         (&[("free-mass", &[("mass_4_g", 0.2)])], &[("tip-mass", &[("mass_g", 0.2)])]),
         (&[("free-drive-filter", &[("share_3", 1.0)])], &[("driver-lag", &[("time_constant_s", 3e-3)])]),
-        // (1 − w) V + w q = (1 − w) (V + w/(1 − w) q).
         (
-            &[("free-voltage-memory", &[("share_3", 0.2)])],
-            &[
-                ("creep", &[("per_decade", 0.25), ("rungs_per_decade", 0.0), ("fastest_s", 0.1)]),
-                ("actuation-gain", &[("scale", 0.8)]),
-            ],
+            &[("free-voltage-memory", &[("share_3", 0.25)])],
+            &[("creep", &[("per_decade", 0.25), ("rungs_per_decade", 0.0), ("fastest_s", 0.1)])],
         ),
         (&[("free-voltage-curve", &line)], &[("actuation-gain", &[("scale", 1.1)])]),
+        (&[("free-drag", &[("cubic", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 3.0)])]),
+        (&[("free-drag", &[("linear", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.0)])]),
+        (&[("free-joint-memory", &loss)], &[("structural-damping", &[("loss_factor", 0.05 * 0.68), ("exponent", -0.5)])]),
     ];
     for (free, named) in cases {
         let (free_run, plain) = (with_all(free), run(CANTILEVER, &[]));

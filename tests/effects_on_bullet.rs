@@ -54,7 +54,7 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 11] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 16] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
@@ -66,6 +66,11 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 11] = [
     ("free-moment-of-rate", &[("range_per_m_s", 200.0), ("moment_2_mn_m", 0.3), ("moment_5_mn_m", 1.0)]),
     ("free-joint-slip", &[("range_per_m", 2.0), ("moment_4_mn_m", 0.5), ("moment_5_mn_m", 1.0)]),
     ("free-drag", &[("linear", 20.0), ("cubic", 10.0)]),
+    ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("damping_s", 5e-3)]),
+    ("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.5)]),
+    ("stiffness-softening", &[("softening_mm2", 2000.0), ("exponent", 1.0)]),
+    ("structural-damping", &[("loss_factor", 0.05), ("exponent", 0.3)]),
+    ("dry-friction", &[("moment_mn_m", 0.3), ("presliding_per_m", 0.5)]),
 ];
 
 #[test]

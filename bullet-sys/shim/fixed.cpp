@@ -12,10 +12,12 @@ FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world)
     : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), btVector3(0, 0, 0), world.getOrigin(),
                                  btMatrix3x3::getIdentity(), world.getBasis()) {}
 
-FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance)
+FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance,
+                                 btScalar damping_time)
     : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), pivot, world(pivot), btMatrix3x3::getIdentity(),
                                  world.getBasis()),
-      compliance_(compliance) {}
+      compliance_(compliance),
+      damping_time_(damping_time) {}
 
 void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
                                            const btContactSolverInfo &info) {
@@ -79,10 +81,11 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
     out.m_rhs = position * out.m_jacDiagABInv + velocity * out.m_jacDiagABInv;
     out.m_cfm = 0;
     if (compliance_ > 0 && i == TURN_ABOUT_Y) {
-      const btScalar softness = compliance_ / (info.m_timeStep * info.m_timeStep);
+      const btScalar whole = info.m_timeStep + damping_time_;
+      const btScalar softness = compliance_ / (info.m_timeStep * whole);
       out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
       out.m_cfm = softness * out.m_jacDiagABInv;
-      out.m_rhs = (velocity - error / info.m_timeStep) * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - error / whole) * out.m_jacDiagABInv;
     }
     out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;

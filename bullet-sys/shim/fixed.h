@@ -12,18 +12,22 @@ namespace bs {
 // row's response by itself; here once per step, and the rows together. A body that is no chain is left to Bullet.
 //
 // With a compliance c the base turns about its y axis as a spring lets it, at a pivot of its own. The row of that turn is so soft that its
-// impulse is that of the spring at the step's end, -h (phi + h omega) / c: implicit Euler, stable for any c and rigid in the limit.
+// impulse is that of the spring and its damper at the step's end, -h (phi + (h + T) omega) / c: implicit Euler, stable for any c and T, rigid in
+// the limit.
 class FixedConstraint : public btMultiBodyFixedConstraint {
  public:
   FixedConstraint(btMultiBody *body, const btTransform &world);
-  FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance);
+  FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance,
+                  btScalar damping_time);
   const btVector3 &pivot() const { return m_pivotInA; }
   btScalar compliance() const { return compliance_; }
+  btScalar damping_time() const { return damping_time_; }
   void createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data, const btContactSolverInfo &info) override;
 
  private:
   Chain chain_;
-  btScalar compliance_ = 0;  // of the turn about y (rad/(dyn cm))
+  btScalar compliance_ = 0;    // of the turn about y (rad/(dyn cm))
+  btScalar damping_time_ = 0;  // its damping over its stiffness (s)
 };
 
 }  // namespace bs

@@ -76,6 +76,7 @@ pub fn candidate(id: &'static str, cause: &'static str, parameters: Vec<Free>, s
         cause,
         places: vec![id],
         is_free_form: false,
+        is_variant: false,
         is_constant: false,
         parameters,
         fixed: Vec::new(),

@@ -145,8 +145,8 @@ pub fn stable_step(robot: &Robot) -> f64 {
 /// As [`stable_step`] (s), for joints bent elastically by `curvature` (1/cm), where hardening may make them stiffer.
 pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     let (chain, joint, extensions) = (Chain::new(robot), robot.joint(), &robot.extensions);
-    // The slope of k δ (1 − a (δ/ℓ)²).
-    let hardening = 1.0 + 3.0 * (-extensions.softening).max(0.0) * curvature * curvature;
+    // The slope of k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p).
+    let hardening = 1.0 + (extensions.softening_exponent + 1.0) * (-extensions.softened(curvature)).max(0.0);
     let link = robot.link_length();
     let slips: f64 = extensions.slips.iter().map(|slip| slip.moment / slip.curvature).sum();
     let stiffness = joint.stiffness * hardening + (extensions.moment_of_curvature.steepest() + slips) / link;

@@ -22,16 +22,24 @@ fn free(p: &'static Parameter, scale: f64) -> Free {
 pub(super) fn candidates(bench: &Bench, visited: &Visited) -> Vec<Candidate> {
     let mut all = Vec::new();
     for effect in EFFECTS.iter().copied() {
-        let Fitting::Candidate { on, forms } = &effect.fitting else { continue };
+        let Fitting::Candidate { on, forms, variants } = &effect.fitting else { continue };
         if on(bench) {
-            forms.iter().for_each(|form| push(&mut all, effect, form, bench, visited));
+            let both = forms.iter().map(|form| (form, false)).chain(variants.iter().map(|form| (form, true)));
+            both.for_each(|(form, is_variant)| push(&mut all, effect, form, is_variant, bench, visited));
         }
     }
     all
 }
 
 /// Adds a form of an effect; once for each actuator if it is of one.
-fn push(all: &mut Vec<Candidate>, effect: &'static Effect, form: &'static Form, bench: &Bench, visited: &Visited) {
+fn push(
+    all: &mut Vec<Candidate>,
+    effect: &'static Effect,
+    form: &'static Form,
+    is_variant: bool,
+    bench: &Bench,
+    visited: &Visited,
+) {
     let fitted = |name: &str| form.fitted.iter().position(|(fitted, _)| *fitted == name);
     let is_left_out = |at: usize| visited.is_beyond(effect, form.fitted[at].0);
     let kept: Vec<usize> = (0..form.fitted.len()).filter(|at| !is_left_out(*at)).collect();
@@ -67,6 +75,7 @@ fn push(all: &mut Vec<Candidate>, effect: &'static Effect, form: &'static Form, 
             cause: effect.cause,
             places: effect.places.iter().map(|place| place.name()).collect(),
             is_free_form: effect.shape.is_some(),
+            is_variant,
             is_constant: effect.kind == Kind::Calibration,
             parameters: parameters.clone(),
             fixed: given.iter().copied().chain(which).collect(),
@@ -90,7 +99,9 @@ mod tests {
             let own: Vec<&Candidate> = all.iter().filter(|c| c.id == effect.id).collect();
             match &effect.fitting {
                 Fitting::Excluded(reason) => assert!(own.is_empty() && !reason.is_empty(), "{}", effect.id),
-                Fitting::Candidate { forms, .. } => assert!(own.len() >= forms.len(), "{}", effect.id),
+                Fitting::Candidate { forms, variants, .. } => {
+                    assert!(own.len() >= forms.len() + variants.len(), "{}", effect.id);
+                }
             }
             for c in own {
                 assert!(!c.starts.is_empty() && c.parameters.iter().all(|p| p.scale > 0.0), "{}", c.id);
@@ -107,8 +118,8 @@ mod tests {
     #[test]
     fn every_form_lists_parameters_of_its_effect_and_every_free_form_has_a_named_rival() {
         for effect in EFFECTS {
-            let Fitting::Candidate { forms, .. } = &effect.fitting else { continue };
-            for (name, _) in forms.iter().flat_map(|form| form.fitted) {
+            let Fitting::Candidate { forms, variants, .. } = &effect.fitting else { continue };
+            for (name, _) in forms.iter().chain(*variants).flat_map(|form| form.fitted) {
                 assert!(effect.parameters.iter().any(|p| p.name == *name), "{}: {name}", effect.id);
             }
             let is_rival = |other: &&&Effect| other.shape.is_none() && other.places.contains(&effect.places[0]);

@@ -70,8 +70,8 @@ pub struct Estimator<'a> {
     pub nuisances: Nuisances,
     /// True for the values that count, runs × values.
     pub used: Vec<Vec<bool>>,
-    /// True while only faults of known spread are nuisance parameters.
-    pub only_given_faults: bool,
+    /// Spread of the bench's faults while it is not estimated.
+    pub held_spread: Option<Spread>,
     /// Columns of the bench's faults of each run; none before the first [`set_faults`](Self::set_faults).
     faults: Vec<Columns>,
     /// The noise that residuals are whitened for.
@@ -133,15 +133,7 @@ impl<'a> Estimator<'a> {
             .map(|run| Nuisance { shares: vec![1.0; plant.nuisances(run)], ..Nuisance::default() })
             .collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
-        Self {
-            plant,
-            nuisances,
-            used,
-            only_given_faults: false,
-            faults: Vec::new(),
-            noise: Noise::default(),
-            kept: Mutex::default(),
-        }
+        Self { plant, nuisances, used, held_spread: None, faults: Vec::new(), noise: Noise::default(), kept: Mutex::default() }
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Arc<Vec<f64>>, DiagnoseError> {
@@ -505,15 +497,14 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn spread(&self, model: &Model, runs: &[usize]) -> Result<Spread, DiagnoseError> {
-        let given = self.plant.bench();
-        if self.only_given_faults {
-            return Ok(Spread { of: given.map(|sd| sd.unwrap_or(0.0)) });
+        if let Some(held) = self.held_spread {
+            return Ok(held);
         }
         let with_columns = runs.iter().filter_map(|run| Some((*run, self.faults.get(*run)?)));
         let moments = with_columns
             .map(|(run, columns)| Ok(columns.moments(&self.misfit(model, run, &self.nuisances[run])?)))
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
-        Ok(bench::spread(&moments, &given))
+        Ok(bench::spread(&moments, &self.plant.bench()))
     }
 
     /// Masks single values whose residuals stand far above those around them in their channel, as after a tracker's slip, and returns their number.

@@ -13,6 +13,7 @@
 
 pub mod bench;
 mod candidates;
+mod curve;
 pub mod dataset;
 pub mod diagnosis;
 mod error;

@@ -2,7 +2,8 @@
 //!
 //! The search adopts a free form where it is worth more than any name: then the place is known and the misfit is taken, whatever the law. Afterwards
 //! each named cause of the place is fitted instead. A name stands if it takes at least [`LEAST_TAKEN`] of what the free form takes on runs that no
-//! parameter was fitted to (detection, localisation, characterisation: Kerschen, Worden, Vakakis, Golinval 2006).
+//! parameter was fitted to (detection, localisation, characterisation: Kerschen, Worden, Vakakis, Golinval 2006). Where no single name does, two of
+//! the place stand together if they cost less than the free form.
 
 use super::DiagnoseError;
 use super::diagnosis::Nearest;
@@ -12,7 +13,10 @@ use super::search::{PROMISING_IN_PLACE, Scored, Search};
 /// A name stands if it takes this share of what the free form takes on held-out runs.
 const LEAST_TAKEN: f64 = 0.95;
 /// Named candidates that are fitted in the stead of a free form.
-const MOST_NAMES: usize = 5;
+const MOST_NAMES: usize = 7;
+/// Names to which a second one is added, and second ones for each, where none stands alone.
+const MOST_FIRST: usize = 2;
+const MOST_SECOND: usize = 3;
 
 /// A model with names where they stand, and the names tried for its free forms, nearest first.
 pub struct Naming {
@@ -32,7 +36,7 @@ pub fn name(search: &mut Search, open: Scored) -> Result<Naming, DiagnoseError> 
     let frees: Vec<Term> = best.model().terms.iter().filter(|term| search.candidate(term).is_free_form).cloned().collect();
     for free in &frees {
         let Some(index) = best.model().terms.iter().position(|term| term.candidate == free.candidate) else { continue };
-        let (named, tried) = names(search, &best, index)?;
+        let (named, tried) = Place::new(search, &best, index)?.named()?;
         nearest.push((search.candidate(free).places.clone(), tried));
         best = named.unwrap_or(best);
     }
@@ -42,62 +46,130 @@ pub fn name(search: &mut Search, open: Scored) -> Result<Naming, DiagnoseError> 
     Ok(Naming { best, nearest })
 }
 
-/// The model with the best name in the stead of term `index`, if one stands, and all that were tried, nearest first.
-///
-/// Named causes of the same place beside the free form are tried without it, and give way to a single name.
-fn names(search: &Search, best: &Scored, index: usize) -> Result<(Option<Scored>, Vec<Nearest>), DiagnoseError> {
-    let free = &best.model().terms[index];
-    let (id, places) = (search.candidate(free).id, &search.candidate(free).places);
-    let of_place = |term: &Term| search.candidate(term).places.iter().any(|place| places.contains(place));
-    let is_companion = |term: &Term| term != free && of_place(term) && !search.candidate(term).is_constant;
-    let only = |keep: &dyn Fn(&Term) -> bool| {
+/// A free form of a model, to be replaced by names.
+struct Place<'a> {
+    search: &'a Search<'a>,
+    /// The model with the free form.
+    best: &'a Scored,
+    /// The free form.
+    free: &'a Term,
+    /// The model without the free form and without named causes of its place, which give way to a single name.
+    bare: Scored,
+}
+
+/// A model with a name in the stead of a free form, and the share of what that takes which it takes too.
+struct Attempt {
+    name: &'static str,
+    taken: f64,
+    scored: Scored,
+}
+
+impl<'a> Place<'a> {
+    fn new(search: &'a Search<'a>, best: &'a Scored, index: usize) -> Result<Self, DiagnoseError> {
+        let free = &best.model().terms[index];
         let mut model = best.model().clone();
-        model.terms.retain(keep);
-        model
-    };
-    let bare = search.fitted(&only(&|term| term != free && !is_companion(term)))?;
-    let taken = |scored: &Scored| search.judged(&bare) - search.judged(scored);
-    let whole = taken(best).max(f64::MIN_POSITIVE);
-    let mut tried: Vec<(f64, &str, Scored)> = Vec::new();
-    let mut attempt = |name: &'static str, model: Model| {
-        (search.progress)(&format!("{name} in the stead of {id}"));
-        // With the model's own constants, then with all.
-        for model in [model.clone(), search.with_constants(&model)] {
-            let Ok(scored) = search.fitted(&model) else { continue };
-            let share = taken(&scored) / whole;
-            tried.push((share, name, scored));
-            if share >= LEAST_TAKEN {
-                break;
+        let is_of_place = |term: &Term| is_of(search, free, term) && !search.candidate(term).is_constant;
+        model.terms.retain(|term| term != free && !is_of_place(term));
+        (search.progress)("the place without its free form");
+        // On the same bench: faults could stand in for what is missing.
+        Ok(Self { bare: search.fitted_at_its_spread(&model)?, search, best, free })
+    }
+
+    /// The model with the best name or the best two, if they stand, and all names that were tried, nearest first.
+    fn named(&self) -> Result<(Option<Scored>, Vec<Nearest>), DiagnoseError> {
+        let mut tried = self.single()?;
+        tried.sort_by(|a, b| b.taken.total_cmp(&a.taken));
+        let mut nearest: Vec<Nearest> = Vec::new();
+        for Attempt { name, taken, .. } in &tried {
+            if nearest.iter().all(|other| other.id != *name) {
+                nearest.push(Nearest { id: (*name).into(), left: (1.0 - taken).clamp(0.0, 1.0) });
             }
         }
-    };
-    let is_rival = |model: &Model| model.terms.last().is_some_and(|term| !search.candidate(term).is_free_form && of_place(term));
-    let screened = search.screen(&bare)?.ranked;
-    let own = PROMISING_IN_PLACE * (bare.total() - best.total());
-    let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| is_rival(model)).collect();
-    // The nearest one is shown even if it is far.
-    let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
-    for model in search.finalists(promising, MOST_NAMES) {
-        if let Some(term) = model.terms.last() {
-            attempt(search.candidate(term).id, model.clone());
+        let cost = |attempt: &Attempt| self.search.cost(&attempt.scored);
+        let least = |attempts: Vec<Attempt>| attempts.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
+        let found = match least(standing) {
+            Some(found) => Some(found),
+            None => least(self.pairs(&others)?).filter(|pair| cost(pair) < self.search.cost(self.best)),
+        };
+        let found = found.map(|found| found.scored);
+        Ok((if found.is_some() { found } else { self.alone()? }, nearest))
+    }
+
+    /// Single names: the promising ones, and those that are in the model beside the free form.
+    fn single(&self) -> Result<Vec<Attempt>, DiagnoseError> {
+        let screened = self.search.screen(&self.bare)?.ranked;
+        let own = PROMISING_IN_PLACE * (self.bare.total() - self.best.total());
+        let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| self.is_rival(model)).collect();
+        // The nearest one is shown even if it is far.
+        let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
+        let models = self.search.finalists(promising, MOST_NAMES);
+        let mut tried: Vec<Attempt> = models.iter().filter_map(|model| self.attempt(model)).collect();
+        if tried.iter().all(|attempt| attempt.taken < LEAST_TAKEN) {
+            // Constants that the free form did not need may make up for what a name lacks.
+            let most = tried.iter().max_by(|a, b| a.taken.total_cmp(&b.taken));
+            let with = most.and_then(|most| self.attempt(&self.search.with_constants(most.scored.model())));
+            tried.extend(with.map(|with| Attempt { name: most.map_or(with.name, |most| most.name), ..with }));
         }
-    }
-    if let Some(companion) = best.model().terms.iter().find(|term| is_companion(term)) {
-        attempt(search.candidate(companion).id, only(&|term| term != free));
-    }
-    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut nearest: Vec<Nearest> = Vec::new();
-    for (share, name, _) in &tried {
-        if nearest.iter().all(|other| other.id != *name) {
-            nearest.push(Nearest { id: (*name).into(), left: (1.0 - share).clamp(0.0, 1.0) });
+        let mut without = self.best.model().clone();
+        without.terms.retain(|term| term != self.free);
+        if without.terms.len() > self.bare.model().terms.len() {
+            let name =
+                without.terms.iter().rfind(|term| is_of(self.search, self.free, term)).map(|term| self.search.candidate(term).id);
+            tried.extend(self.attempt(&without).map(|kept| Attempt { name: name.unwrap_or(kept.name), ..kept }));
         }
+        Ok(tried)
     }
-    // Of those that stand the one with the fewest parameters.
-    let standing = tried.into_iter().filter(|(share, ..)| *share >= LEAST_TAKEN).map(|(.., scored)| scored);
-    let named = standing.min_by_key(Scored::freedom);
-    if named.is_some() || !best.model().terms.iter().any(is_companion) {
-        return Ok((named, nearest));
+
+    /// Two names, from the best single ones.
+    fn pairs(&self, tried: &[Attempt]) -> Result<Vec<Attempt>, DiagnoseError> {
+        let mut pairs = Vec::new();
+        let mut firsts: Vec<&Attempt> = Vec::new();
+        for attempt in tried {
+            if firsts.len() < MOST_FIRST && firsts.iter().all(|other| other.name != attempt.name) {
+                firsts.push(attempt);
+            }
+        }
+        for first in firsts {
+            let screened = self.search.screen(&first.scored)?.ranked;
+            let rivals = screened.iter().filter(|(_, model)| self.is_rival(model));
+            pairs.extend(self.search.finalists(rivals, MOST_SECOND).iter().filter_map(|model| self.attempt(model)));
+        }
+        Ok(pairs)
     }
-    let alone = search.fitted(&only(&|term| !is_companion(term)))?;
-    Ok((Some(alone).filter(|alone| taken(alone) >= LEAST_TAKEN * whole), nearest))
+
+    /// The free form without named causes of its place, if there are some and it takes as much as a name would have to.
+    fn alone(&self) -> Result<Option<Scored>, DiagnoseError> {
+        let mut model = self.bare.model().clone();
+        if model.terms.len() + 1 == self.best.model().terms.len() {
+            return Ok(None);
+        }
+        model.terms.push(self.free.clone());
+        let alone = self.search.fitted_at_its_spread(&model)?;
+        Ok(Some(alone).filter(|alone| self.taken(alone) >= LEAST_TAKEN))
+    }
+
+    /// Share of what the free form takes on held-out runs that another model takes.
+    fn taken(&self, scored: &Scored) -> f64 {
+        let below = |scored: &Scored| self.search.judged(&self.bare) - self.search.judged(scored);
+        below(scored) / below(self.best).max(f64::MIN_POSITIVE)
+    }
+
+    /// A model whose last term is the name; none if it cannot be fitted.
+    fn attempt(&self, model: &Model) -> Option<Attempt> {
+        let name = self.search.candidate(model.terms.last()?).id;
+        (self.search.progress)(&format!("{name} in the stead of {}", self.search.candidate(self.free).id));
+        let scored = self.search.fitted_at_its_spread(model).ok()?;
+        Some(Attempt { name, taken: self.taken(&scored), scored })
+    }
+
+    /// True if a model's last term is a named cause of the place.
+    fn is_rival(&self, model: &Model) -> bool {
+        model.terms.last().is_some_and(|term| !self.search.candidate(term).is_free_form && is_of(self.search, self.free, term))
+    }
+}
+
+/// True if a term acts at a place of the free form.
+fn is_of(search: &Search, free: &Term, term: &Term) -> bool {
+    search.candidate(term).places.iter().any(|place| search.candidate(free).places.contains(place))
 }

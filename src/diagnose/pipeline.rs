@@ -1,17 +1,19 @@
 //! The diagnosis of a plant, from its measured runs to a [`Diagnosis`].
 
 use super::DiagnoseError;
+use super::bench::Spread;
+use super::curve::curve;
 use super::dataset::Role;
-use super::diagnosis::{Adopted, Curve, Diagnosis, Estimate, Nearest, Part, Ranked, RunError, Stage, Verdict};
+use super::diagnosis::{Adopted, Diagnosis, Estimate, Nearest, Part, Ranked, RunError, Stage, Verdict};
 use super::faults;
 use super::fit::{BLOCK, Estimator, Residuals, sum_of_squares};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::naming::{self, Naming};
-use super::plant::{FreeCurve, Model, Plant, Signal, Term};
+use super::plant::{Model, Plant, Signal, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
-use super::stability::stability;
+use super::stability::{Standing, standing};
 use super::summary::{Findings, failing, summary};
 
 /// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
@@ -367,10 +369,9 @@ struct Causes {
 /// the way, and the less costly model counts.
 fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
-    search.estimator.only_given_faults = true;
-    let without = search.estimator.spread(calibrated.model(), &[])?;
+    let without = Spread { of: search.estimator.plant.bench().map(|sd| sd.unwrap_or(0.0)) };
     let has_faults = calibrated.model().spread != without;
-    search.estimator.only_given_faults = has_faults;
+    search.estimator.held_spread = has_faults.then_some(without);
     let start = if has_faults {
         search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?
     } else {
@@ -413,6 +414,8 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     }
     causes.open = causes.best.above(search.estimator.count(&search.split.all()));
     let before = causes.best.model().clone();
+    // What a name leaves is no fault of the bench.
+    search.estimator.held_spread = Some(before.spread);
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
     causes.nearest = nearest;
     causes.best = search.backward(best)?;
@@ -432,7 +435,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         search.forward(calibrated.clone())?
     };
     if search.is_given_up(&best) {
-        search.estimator.only_given_faults = false;
+        search.estimator.held_spread = None;
         return Ok(Causes {
             coarse_total: best.total(),
             best,
@@ -450,7 +453,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     best = search.resolve(best)?;
     best = search.backward(best)?;
     best = search.resolve(best)?;
-    if std::mem::take(&mut search.estimator.only_given_faults) {
+    if search.estimator.held_spread.take().is_some() {
         best = search.settle(best)?;
         best = search.backward(best)?;
     }
@@ -560,6 +563,7 @@ fn adopted(
         ci95: [Some(value); 2],
         at_bound: false,
     });
+    let Standing { stability, is_left_by_law } = standing(search, best, &without, index)?;
     Ok(Adopted {
         id: candidate.id.to_owned(),
         kind: candidate.kind.to_owned(),
@@ -568,54 +572,12 @@ fn adopted(
         parameters: which.chain(estimates(search, index, term, found)).collect(),
         tied_with,
         share: (chi2(&without) - chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64,
-        role: Part::Cause,
-        stability: stability(search, best, &without, index)?,
+        role: if is_left_by_law { Part::Minor } else { Part::Cause },
+        stability,
         curve: curve(search, best, index, found),
         nearest: Vec::new(),
         gain_heldout: gain(search, best, &without),
         fixed: form.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
-    })
-}
-
-/// The curve of term `index` with its pointwise 95 % band, from the covariance of its weights; none of a named cause.
-fn curve(search: &Search, best: &Scored, index: usize, found: &Intervals) -> Option<Curve> {
-    let term = &best.model().terms[index];
-    let plant = search.estimator.plant;
-    let FreeCurve { x, y, points } = plant.curve(term)?;
-    let parameters = &search.candidate(term).parameters;
-    let first: usize = found.sizes[..index].iter().sum();
-    // Ordinates are linear in the weights.
-    let slopes: Vec<Vec<f64>> = (0..term.x.len())
-        .map(|k| {
-            let mut moved = term.clone();
-            let by = if term.x[k] + parameters[k].scale > parameters[k].bounds[1] {
-                -parameters[k].scale
-            } else {
-                parameters[k].scale
-            };
-            moved.x[k] += by;
-            let moved = plant.curve(&moved).map_or(Vec::new(), |curve| curve.points);
-            moved.iter().zip(&points).map(|(a, b)| (a[1] - b[1]) / by).collect()
-        })
-        .collect();
-    let half = |at: usize| {
-        let mut variance = 0.0;
-        for (i, a) in slopes.iter().enumerate() {
-            for (j, b) in slopes.iter().enumerate() {
-                variance += a[at] * b[at] * found.covariance[(first + i, first + j)];
-            }
-        }
-        1.96 * variance.max(0.0).sqrt()
-    };
-    let [x_name, x_unit, y_name, y_unit] = [x[0], x[1], y[0], y[1]].map(String::from);
-    Some(Curve {
-        x_name,
-        x_unit,
-        y_name,
-        y_unit,
-        x: points.iter().map(|[x, _]| *x).collect(),
-        y: points.iter().map(|[_, y]| *y).collect(),
-        ci95: points.iter().enumerate().map(|(at, [_, y])| [y - half(at), y + half(at)]).collect(),
     })
 }
 

@@ -47,6 +47,8 @@ pub struct Candidate {
     pub places: Vec<&'static str>,
     /// True for a free form: no law, but a curve that shows which law is missing at its place. Named candidates of the place are tried in its stead.
     pub is_free_form: bool,
+    /// True for another law of a cause, with a parameter for its shape: tried in the stead of what was found at its place, not in the search.
+    pub is_variant: bool,
     /// True for a constant of the nominal model, which is fitted before other causes are tried.
     pub is_constant: bool,
     /// Fitted parameters.

@@ -421,8 +421,8 @@ impl Search<'_> {
                 // Least squares of −rest on the two.
                 let ([uu, ur], [vv, vr], uv) = (sizes[index], sizes[other], u.dot(v));
                 let determinant = uu * vv - uv * uv;
-                let is_free = |term: &Term| self.candidate(term).is_free_form;
-                if is_free(first) || is_free(second) {
+                let is_no_law = |term: &Term| self.candidate(term).is_free_form || self.candidate(term).is_variant;
+                if is_no_law(first) || is_no_law(second) {
                     continue;
                 }
                 if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
@@ -495,7 +495,9 @@ impl Search<'_> {
     pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
         let screened = self.screen(from)?;
-        let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
+        let is_basic = |(_, model): &&(f64, Model)| model.terms.last().is_none_or(|term| !self.candidate(term).is_variant);
+        let (free, named): (Vec<_>, Vec<_>) =
+            screened.ranked.iter().filter(is_basic).partition(|(_, model)| self.ends_free(model));
         let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
         let most_free = free.first().map_or(0.0, |(gain, _)| *gain);
         let mut finalists = self.finalists(named.into_iter().filter(|(gain, _)| *gain >= PROMISING * most), FINALISTS);
@@ -548,11 +550,13 @@ impl Search<'_> {
             // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
             let top_of =
                 |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
-            let top = match (top_of(false), top_of(true)) {
-                (Some(named), Some(free)) => Some(if self.is_closer(free, named) { free } else { named }),
+            let top = match (top_of(false).cloned(), top_of(true).cloned()) {
+                (Some(named), Some(free)) if self.is_closer(&free, &named) => {
+                    let named = self.with_its_law(named)?;
+                    Some(if self.is_closer(&free, &named) { free } else { named })
+                }
                 (named, free) => named.or(free),
             };
-            let top = top.cloned();
             let worthy = match top.filter(|top| self.is_worth(top, &best)) {
                 Some(top) => Some(top),
                 None => match self.seen_by_fit_runs(&mut best, &trials)? {
@@ -564,7 +568,8 @@ impl Search<'_> {
                 first.get_or_insert(trials);
                 break;
             };
-            // The discretisation is refined before another cause could take its error.
+            // The law and the discretisation are refined before another cause could take their errors.
+            let worthy = self.with_its_law(worthy)?;
             let settled = self.settle(worthy)?;
             best = self.resolve(settled)?;
             if first.is_none() {
@@ -575,6 +580,42 @@ impl Search<'_> {
             }
         }
         Ok((best, first.unwrap_or_default()))
+    }
+
+    /// The model with another law of its last term's cause, if that is significantly better.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a better law cannot be fitted to the end.
+    fn with_its_law(&self, scored: Scored) -> Result<Scored, DiagnoseError> {
+        let Some(last) = scored.model().terms.last().cloned() else { return Ok(scored) };
+        let own = self.candidate(&last);
+        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| last.x[at]);
+        let mut best: Option<Scored> = None;
+        for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
+            if variant.id != own.id || !variant.is_variant || own.is_variant {
+                continue;
+            }
+            let mut tried: Vec<Vec<f64>> = Vec::new();
+            for start in &variant.starts {
+                // What both laws have in common stays as it is.
+                let x: Vec<f64> = start.iter().zip(&variant.parameters).map(|(x, p)| value(p.name).unwrap_or(*x)).collect();
+                if tried.contains(&x) {
+                    continue;
+                }
+                (self.progress)(&format!("another law of {}", own.id));
+                let mut model = scored.model().clone();
+                model.terms.pop();
+                model.terms.push(Term { candidate, x: x.clone() });
+                tried.push(x);
+                let Ok(other) = self.ranked(&model) else { continue };
+                if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
+                    best = Some(other);
+                }
+            }
+        }
+        let Some(best) = best else { return Ok(scored) };
+        let best = self.fitted(best.model())?;
+        Ok(if self.is_significant(&best, &scored) { best } else { scored })
     }
 
     /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.
@@ -684,7 +725,8 @@ impl Search<'_> {
             let mut model = best.model().clone();
             let removed = model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
-            let without = self.fitted(&model)?;
+            // On the same bench: faults could stand in for the cause.
+            let without = self.fitted_at_its_spread(&model)?;
             let screened = self.screen(&without)?.ranked;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();
@@ -892,6 +934,7 @@ mod tests {
                 cause: "A wave.",
                 places: vec!["test"],
                 is_free_form: false,
+                is_variant: false,
                 is_constant: false,
                 parameters: vec![Free {
                     name: "x",

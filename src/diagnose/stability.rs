@@ -1,30 +1,65 @@
-//! How often a cause would be chosen if other runs had been measured.
+//! How firmly a cause stands: how often it would be chosen if other runs had been measured, and whether the law of another could do its work.
 
 use nalgebra::DVector;
 
 use super::DiagnoseError;
-use super::plant::Term;
-use super::search::{LEAST_GAIN, Scored, Search, without_directions};
+use super::plant::{Candidate, Model, Term};
+use super::search::{LEAST_GAIN, Scored, Screened, Search, without_directions};
 
 /// Fewest runs that are resampled.
 const LEAST_RUNS: usize = 4;
 
-/// Share of resamples, which leave out one or two of the runs, in which term `index` of `best` is chosen: in which it lowers χ² of the model `without` it by
-/// more than any other cause, and visibly. Linear in the change of the residuals, so no fit is needed. None with few runs.
+/// A constant may make up for what the law of another cause lacks if that place's free form would take this share of what it takes.
+const TAKEN_BY_LAW: f64 = 0.9;
+
+/// How firmly a cause stands.
+pub(super) struct Standing {
+    /// Share of resamples in which it is chosen; none with few runs.
+    pub stability: Option<f64>,
+    /// True for a constant in the stead of which the free form of another cause's place would do as well: it may be what the law of that cause lacks.
+    pub is_left_by_law: bool,
+}
+
+/// How firmly term `index` of `best` stands against the model `without` it. Linear in the change of the residuals, so no fit is needed.
 ///
 /// # Errors
 /// [`DiagnoseError`] if the model cannot be simulated.
-pub(super) fn stability(search: &Search, best: &Scored, without: &Scored, index: usize) -> Result<Option<f64>, DiagnoseError> {
+pub(super) fn standing(search: &Search, best: &Scored, without: &Scored, index: usize) -> Result<Standing, DiagnoseError> {
+    let screened = search.screen(without)?;
+    Ok(Standing {
+        stability: stability(search, best, without, index, &screened),
+        is_left_by_law: is_left_by_law(search, best, without, index, &screened),
+    })
+}
+
+fn is_left_by_law(search: &Search, best: &Scored, without: &Scored, index: usize, screened: &Screened) -> bool {
+    let own = search.candidate(&best.model().terms[index]);
+    let others = || without.model().terms.iter().map(|term| search.candidate(term)).filter(|other| !other.is_constant);
+    let is_law = |model: &Model| {
+        let free = model.terms.last().map(|term| search.candidate(term)).filter(|free| free.is_free_form);
+        // A free form of the constant's own place holds the constant.
+        free.is_some_and(|free| {
+            let is_of = |candidate: &Candidate| candidate.places.iter().any(|place| free.places.contains(place));
+            !is_of(own) && others().any(is_of)
+        })
+    };
+    let most = screened.ranked.iter().filter(|(_, model)| is_law(model)).map(|(gain, _)| *gain).fold(0.0, f64::max);
+    own.is_constant && most > TAKEN_BY_LAW * (without.total() - best.total())
+}
+
+/// Share of resamples, which leave out one or two of the runs, in which term `index` of `best` is chosen: in which it lowers χ² of the model `without` it by
+/// more than any other cause, and visibly.
+fn stability(search: &Search, best: &Scored, without: &Scored, index: usize, screened: &Screened) -> Option<f64> {
     let runs = search.split.all();
     if runs.len() < LEAST_RUNS {
-        return Ok(None);
+        return None;
     }
     let own = search.candidate(&best.model().terms[index]);
-    let screened = search.screen(without)?;
     let is_rival = |term: &Term| {
         let other = search.candidate(term);
         other.id != own.id
             && !other.is_free_form
+            && !other.is_variant
             && !(own.is_free_form && other.places.iter().any(|place| own.places.contains(place)))
     };
     let joined =
@@ -47,7 +82,7 @@ pub(super) fn stability(search: &Search, best: &Scored, without: &Scored, index:
     };
     let resamples: Vec<bool> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).map(|pair| is_chosen(&pair)).collect();
     let chosen = resamples.iter().filter(|is_chosen| **is_chosen).count();
-    Ok(Some(chosen as f64 / resamples.len() as f64))
+    Some(chosen as f64 / resamples.len() as f64)
 }
 
 /// Per run the inner products of a column with the residuals and with itself.

@@ -147,6 +147,8 @@ pub enum Fitting {
         on: fn(&Bench) -> bool,
         /// Its forms.
         forms: &'static [Form],
+        /// Other laws of the same cause, with a parameter for the shape: tried where a form of its place is found, not in the search.
+        variants: &'static [Form],
     },
     /// It is not, for a reason.
     Excluded(&'static str),

@@ -93,7 +93,13 @@ impl BulletEngine {
         match robot.mount {
             Mount::Clamped if extensions.clamp_compliance > 0.0 => {
                 let left_end = [-bodies[0].middle * segments[0].length, 0.0, 0.0];
-                world.add_sprung_constraint(body, left_end, extensions.clamp_compliance, CLAMP_IMPULSE)?;
+                world.add_sprung_constraint(
+                    body,
+                    left_end,
+                    extensions.clamp_compliance,
+                    extensions.clamp_damping,
+                    CLAMP_IMPULSE,
+                )?;
             }
             Mount::Clamped => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
             Mount::Ground => {

@@ -3,93 +3,129 @@
 /// Points on each side of the origin.
 pub const CURVE_POINTS: usize = 5;
 
-/// A piecewise cubic with a continuous slope (Catmull and Rom 1974) through the origin and [`CURVE_POINTS`] equidistant points on each side; beyond
-/// them it goes on straight. On a warped axis the points are equidistant in `asinh(x/warp)`.
+/// A piecewise cubic with a continuous slope through the origin and [`CURVE_POINTS`] points on each side; beyond them it goes on straight. The slope at
+/// a point is that of the parabola through it and its neighbours (Catmull and Rom 1974 for equidistant points), at the origin that of the chord
+/// between its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
-    /// Abscissa of the last point on the negative and on the positive side, as distances from the origin; 0 for a side without points.
-    pub ends: [f64; 2],
-    /// Values on the negative and on the positive side, from the origin outwards.
-    pub values: [[f64; CURVE_POINTS]; 2],
-    /// Abscissa about which the axis changes from linear to logarithmic; infinite for a linear axis.
-    pub warp: f64,
+    /// Negative and positive side.
+    sides: [Side; 2],
+}
+
+/// One side, by the distance from the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Side {
+    /// Distances of the points, from the origin outwards; 0 for a side without points.
+    knots: [f64; CURVE_POINTS],
+    /// Values there.
+    values: [f64; CURVE_POINTS],
+    /// Coefficients of the cubics between the points, in the distance from the inner one.
+    cubics: [[f64; 4]; CURVE_POINTS],
+    /// Slope beyond the last point, over the distance.
+    last: f64,
+}
+
+impl Side {
+    const EMPTY: Self =
+        Self { knots: [0.0; CURVE_POINTS], values: [0.0; CURVE_POINTS], cubics: [[0.0; 4]; CURVE_POINTS], last: 0.0 };
+
+    /// A side with its slope at the origin over the distance.
+    fn new(knots: [f64; CURVE_POINTS], values: [f64; CURVE_POINTS], origin: f64) -> Self {
+        if knots[0] == 0.0 {
+            return Self { last: origin, ..Self::EMPTY };
+        }
+        let at = |k: usize| if k == 0 { [0.0; 2] } else { [knots[k - 1], values[k - 1]] };
+        let width = |k: usize| at(k + 1)[0] - at(k)[0];
+        let secant = |k: usize| (at(k + 1)[1] - at(k)[1]) / width(k);
+        let slope = |k: usize| match k {
+            0 => origin,
+            CURVE_POINTS => secant(CURVE_POINTS - 1),
+            _ => (width(k) * secant(k - 1) + width(k - 1) * secant(k)) / (width(k - 1) + width(k)),
+        };
+        let cubic = |k: usize| {
+            let (h, rise, p, q) = (width(k), secant(k), slope(k), slope(k + 1));
+            [at(k)[1], p, (3.0 * rise - 2.0 * p - q) / h, (p + q - 2.0 * rise) / (h * h)]
+        };
+        Self { knots, values, cubics: std::array::from_fn(cubic), last: slope(CURVE_POINTS) }
+    }
+
+    /// Value and slope at a distance.
+    fn at(&self, distance: f64) -> [f64; 2] {
+        let end = self.knots[CURVE_POINTS - 1];
+        if distance >= end {
+            return [self.values[CURVE_POINTS - 1] + self.last * (distance - end), self.last];
+        }
+        let k = self.knots.iter().take_while(|knot| distance >= **knot).count();
+        let t = distance - if k == 0 { 0.0 } else { self.knots[k - 1] };
+        let [a, b, c, d] = self.cubics[k];
+        [a + t * (b + t * (c + t * d)), b + t * (2.0 * c + 3.0 * t * d)]
+    }
 }
 
 impl Curve {
     /// 0 everywhere.
-    pub const ZERO: Self = Self { ends: [0.0; 2], values: [[0.0; CURVE_POINTS]; 2], warp: f64::INFINITY };
+    pub const ZERO: Self = Self { sides: [Side::EMPTY; 2] };
 
-    /// An odd curve with its last points at ±`end`.
+    /// A curve through the points at `knots` (distances from the origin, from there outwards; 0 for a side without points) on the negative and the
+    /// positive side, with its `values` there.
+    pub fn new(knots: [[f64; CURVE_POINTS]; 2], values: [[f64; CURVE_POINTS]; 2]) -> Self {
+        let width = knots[0][0] + knots[1][0];
+        let first = |side: usize| if knots[side][0] > 0.0 { values[side][0] } else { 0.0 };
+        let origin = if width > 0.0 { (first(1) - first(0)) / width } else { 0.0 };
+        Self { sides: [Side::new(knots[0], values[0], -origin), Side::new(knots[1], values[1], origin)] }
+    }
+
+    /// A curve through equidistant points up to the distances `ends` on the negative and the positive side; 0 for a side without points.
+    pub fn equidistant(ends: [f64; 2], values: [[f64; CURVE_POINTS]; 2]) -> Self {
+        Self::new(ends.map(|end| std::array::from_fn(|k| end * (k + 1) as f64 / CURVE_POINTS as f64)), values)
+    }
+
+    /// An odd curve up to ±`end`, whose points are equidistant in asinh(x/`warp`): they are close together about the origin.
     pub fn odd(end: f64, values: [f64; CURVE_POINTS], warp: f64) -> Self {
-        Self { ends: [end; 2], values: [values.map(|value| -value), values], warp }
+        let step = (end / warp).asinh() / CURVE_POINTS as f64;
+        let knots = std::array::from_fn(|k| if k + 1 == CURVE_POINTS { end } else { warp * (step * (k + 1) as f64).sinh() });
+        Self::new([knots; 2], [values.map(|value| -value), values])
+    }
+
+    /// Distances of the last points on the negative and the positive side from the origin; 0 for a side without points.
+    pub fn ends(&self) -> [f64; 2] {
+        [0, 1].map(|side| self.sides[side].knots[CURVE_POINTS - 1])
     }
 
     /// True if it is 0 everywhere.
     pub fn is_zero(&self) -> bool {
-        self.values.as_flattened().iter().all(|value| *value == 0.0)
+        self.largest() == 0.0
     }
 
     /// Largest absolute value of a point.
     pub fn largest(&self) -> f64 {
-        self.values.as_flattened().iter().fold(0.0, |largest, value| value.abs().max(largest))
+        self.sides.iter().flat_map(|side| side.values).fold(0.0, |largest, value| value.abs().max(largest))
     }
 
-    /// The steepest rise between the last points.
+    /// The steepest rise between the last points: a cubic is steepest at its ends or where its second derivative is 0.
     pub fn steepest(&self) -> f64 {
-        const SAMPLES: i32 = 16;
-        let slopes = (-SAMPLES..=SAMPLES).map(|at| {
-            let share = f64::from(at) / f64::from(SAMPLES);
-            let end = self.ends[usize::from(at > 0)];
-            let x = if self.warp.is_finite() { self.warp * (share * (end / self.warp).asinh()).sinh() } else { share * end };
-            self.at(x)[1]
-        });
-        slopes.fold(0.0, f64::max)
-    }
-
-    /// Coordinate on the axis, and its derivative.
-    fn warped(&self, x: f64) -> [f64; 2] {
-        if self.warp.is_finite() {
-            [self.warp * (x / self.warp).asinh(), 1.0 / (1.0 + (x / self.warp).powi(2)).sqrt()]
-        } else {
-            [x, 1.0]
-        }
+        let of = |(sign, side): (f64, &Side)| {
+            let mut steepest = (sign * side.last).max(0.0);
+            let mut inner = 0.0;
+            for (outer, [_, b, c, d]) in side.knots.iter().zip(side.cubics) {
+                let width = outer - inner;
+                for t in [0.0, (-c / (3.0 * d)).clamp(0.0, width), width] {
+                    // An infinite or missing turning point is none.
+                    if t.is_finite() {
+                        steepest = steepest.max(sign * (b + t * (2.0 * c + 3.0 * t * d)));
+                    }
+                }
+                inner = *outer;
+            }
+            steepest
+        };
+        [-1.0, 1.0].into_iter().zip(&self.sides).map(of).fold(0.0, f64::max)
     }
 
     /// Value and slope at `x`.
     pub fn at(&self, x: f64) -> [f64; 2] {
-        let steps = self.ends.map(|end| self.warped(end)[0] / CURVE_POINTS as f64);
-        let [below, above] = [self.values[0][0], self.values[1][0]];
-        // The slope at the origin, and that of a curve with one side only.
-        let width = steps[0] + steps[1];
-        if width == 0.0 {
-            return [0.0; 2];
-        }
-        let origin = (above - below) / width;
-        let [s, ds] = self.warped(x);
-        let side = usize::from(s > 0.0);
-        let (step, values) = (steps[side], &self.values[side]);
-        let distance = s.abs();
-        if step == 0.0 {
-            return [origin * s, origin * ds];
-        }
-        let sign = if side == 1 { 1.0 } else { -1.0 };
-        let value = |k: usize| if k == 0 { 0.0 } else { values[k - 1] };
-        let slope = |k: usize| match k {
-            0 => sign * origin * step,
-            CURVE_POINTS => value(k) - value(k - 1),
-            _ => 0.5 * (value(k + 1) - value(k - 1)),
-        };
-        let k = (distance / step) as usize;
-        let (y, outward) = if k >= CURVE_POINTS {
-            let last = slope(CURVE_POINTS);
-            (value(CURVE_POINTS) + last * (distance / step - CURVE_POINTS as f64), last)
-        } else {
-            let t = distance / step - k as f64;
-            let (a, b, p, q) = (value(k), value(k + 1), slope(k), slope(k + 1));
-            let cubic = [a, p, 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q];
-            (cubic[0] + t * (cubic[1] + t * (cubic[2] + t * cubic[3])), cubic[1] + t * (2.0 * cubic[2] + 3.0 * t * cubic[3]))
-        };
-        [y, sign * outward / step * ds]
+        let [value, slope] = self.sides[usize::from(x > 0.0)].at(x.abs());
+        [value, if x > 0.0 { slope } else { -slope }]
     }
 }
 
@@ -99,19 +135,33 @@ mod tests {
 
     #[test]
     fn straight_lines_and_the_values_of_points_are_exact_and_the_slope_is_the_derivative() {
-        let line =
-            Curve { ends: [2.0, 6.0], values: [[-0.4, -0.8, -1.2, -1.6, -2.0], [1.2, 2.4, 3.6, 4.8, 6.0]], warp: f64::INFINITY };
+        let line = Curve::equidistant([2.0, 6.0], [[-0.4, -0.8, -1.2, -1.6, -2.0], [1.2, 2.4, 3.6, 4.8, 6.0]]);
         for x in [-5.0, -1.3, 0.0, 0.7, 6.0, 9.0] {
             let [y, slope] = line.at(x);
             assert!((y - x).abs() < 1e-12 && (slope - 1.0).abs() < 1e-12, "{x}: {y}, {slope}");
         }
-        let bent = Curve { ends: [4.0, 8.0], values: [[-1.0, 0.5, 0.1, 2.0, -3.0], [0.3, 1.0, -2.0, 4.0, 5.0]], warp: 0.7 };
-        for x in [-6.0, -3.1, -0.4, 0.2, 1.9, 7.0, 11.0] {
+        let bent = Curve::new(
+            [[0.1, 0.5, 1.0, 2.0, 4.0], [0.3, 0.8, 2.0, 4.5, 8.0]],
+            [[-1.0, 0.5, 0.1, 2.0, -3.0], [0.3, 1.0, -2.0, 4.0, 5.0]],
+        );
+        let mut steepest = 0.0_f64;
+        for k in -6000..12_000 {
+            let x = 1e-3 * f64::from(k) + 5e-4;
+            let [_, slope] = bent.at(x);
             let difference = (bent.at(x + 1e-6)[0] - bent.at(x - 1e-6)[0]) / 2e-6;
-            assert!((bent.at(x)[1] - difference).abs() < 1e-6 * (1.0 + difference.abs()), "{x}");
+            assert!((slope - difference).abs() < 1e-4 * (1.0 + difference.abs()), "{x}: {slope} {difference}");
+            steepest = steepest.max(slope);
         }
+        assert!((bent.steepest() / steepest - 1.0).abs() < 1e-3, "{} {steepest}", bent.steepest());
         assert!((bent.at(8.0)[0] - 5.0).abs() < 1e-12 && (bent.at(-4.0)[0] + 3.0).abs() < 1e-12);
         let odd = Curve::odd(3.0, [1.0, 2.0, 2.5, 2.6, 2.6], 0.1);
         assert!((odd.at(1.7)[0] + odd.at(-1.7)[0]).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_side_without_points_goes_on_straight() {
+        let half = Curve::equidistant([0.0, 5.0], [[0.0; 5], [2.0, 4.0, 6.0, 8.0, 10.0]]);
+        assert!((half.at(-3.0)[0] + 6.0).abs() < 1e-12 && (half.at(2.5)[0] - 5.0).abs() < 1e-12);
+        assert!(Curve::ZERO.is_zero() && Curve::ZERO.at(3.0) == [0.0; 2]);
     }
 }

@@ -17,14 +17,18 @@ pub struct Extensions {
     pub friction_scale: f64,
     /// Turn of a clamped root per moment on it (rad/(dyn·cm)).
     pub clamp_compliance: f64,
+    /// Damping of a compliant clamp over its stiffness (s).
+    pub clamp_damping: f64,
     /// Masses fixed to the sheet.
     pub point_masses: Vec<PointMass>,
     /// Curvature at 0 V (1/cm), one per actuator, or none.
     pub rest_curvature: Vec<f64>,
     /// Factor on each joint's voltage (–), or none.
     pub joint_gains: Vec<f64>,
-    /// a of `k δ (1 − a (δ/ℓ)²)` (cm²).
+    /// a of `k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p)` (cm²), with κ₀ = [`SOFTENING_CURVATURE`].
     pub softening: f64,
+    /// p of the same; 2 is the cubic law.
+    pub softening_exponent: f64,
     /// Moment of dry friction in every joint (dyn·cm).
     pub dry_friction: f64,
     /// Moment (dyn·cm) of a joint against its elastic curvature (1/cm), beside the linear one.
@@ -37,6 +41,8 @@ pub struct Extensions {
     pub loss: [f64; LOSS_TIMES.len()],
     /// Drag coefficient of the sheet in air at [`DRAG_SPEED`] (–), in parts that depend on the speed by [`DRAG_POWERS`].
     pub drag: [f64; DRAG_POWERS.len()],
+    /// Another part of the drag coefficient at [`DRAG_SPEED`] (–), with any power of the speed.
+    pub drag_of_power: [f64; 2],
     /// Slope of the floor (rad), positive if it rises along +x.
     pub slope: f64,
     /// Share of the approach speed that contact returns (–).
@@ -93,16 +99,19 @@ impl Default for Extensions {
             mass_scale: 1.0,
             friction_scale: 1.0,
             clamp_compliance: 0.0,
+            clamp_damping: 0.0,
             point_masses: Vec::new(),
             rest_curvature: Vec::new(),
             joint_gains: Vec::new(),
             softening: 0.0,
+            softening_exponent: 2.0,
             dry_friction: 0.0,
             moment_of_curvature: Curve::ZERO,
             moment_of_rate: Curve::ZERO,
             slips: Vec::new(),
             loss: [0.0; LOSS_TIMES.len()],
             drag: [0.0; DRAG_POWERS.len()],
+            drag_of_power: [0.0, 2.0],
             slope: 0.0,
             restitution: 0.0,
             stick_slip: StickSlip::OFF,
@@ -112,6 +121,8 @@ impl Default for Extensions {
 
 /// Rate at which dry friction has 76 % of its moment (rad/s): `τ_c tanh(θ̇/ω)`.
 pub const DRY_FRICTION_RATE: f64 = 0.03;
+/// Curvature at which softening of any power is that of the cubic law (1/cm).
+pub const SOFTENING_CURVATURE: f64 = 0.02;
 /// Softening leaves at least this share of a joint's stiffness.
 pub const LEAST_STIFFNESS: f64 = 0.5;
 /// Time constants (s) of the loss ladder: a loss factor of about 0.68 ξ that is flat from 0.3 to 500 Hz.
@@ -123,6 +134,8 @@ pub const VISCOUS_REACH: f64 = 0.02;
 pub const DRAG_POWERS: [i32; 3] = [1, 2, 3];
 /// Speed at which the parts of drag have their coefficients (cm/s).
 pub const DRAG_SPEED: f64 = 100.0;
+/// Below this share of [`DRAG_SPEED`] drag of any power is viscous: powers below 1 have no slope at rest.
+const LEAST_DRAG_RATIO: f64 = 1e-4;
 /// Density of air (g/cm³).
 pub const AIR_DENSITY: f64 = 1.2e-3;
 
@@ -144,22 +157,33 @@ impl Extensions {
 
     /// Whether the sheet has drag in air.
     pub fn has_drag(&self) -> bool {
-        self.drag != [0.0; DRAG_POWERS.len()]
+        self.drag != [0.0; DRAG_POWERS.len()] || self.drag_of_power[0] != 0.0
     }
 
     /// Force against the motion per length of a sheet (dyn/cm) of the given `width` (cm), per normal speed `v` (cm/s): dyn·s/cm².
     pub fn drag_per_speed(&self, width: f64, v: f64) -> f64 {
         let [linear, quadratic, cubic] = self.drag;
         let ratio = v.abs() / DRAG_SPEED;
-        0.5 * AIR_DENSITY * width * DRAG_SPEED * (linear + ratio * (quadratic + ratio * cubic))
+        let [coefficient, power] = self.drag_of_power;
+        let other = if coefficient == 0.0 { 0.0 } else { coefficient * ratio.max(LEAST_DRAG_RATIO).powf(power - 1.0) };
+        0.5 * AIR_DENSITY * width * DRAG_SPEED * (linear + ratio * (quadratic + ratio * cubic) + other)
     }
 
     /// Torque of a joint beyond eq. 1 (dyn·cm) at the elastic angle `delta` (rad) and the rate (rad/s), for a joint of stiffness `k`
     /// (dyn·cm/rad) that stands for the length `link` (cm): softening, curves and dry friction.
     pub fn torque(&self, k: f64, link: f64, delta: f64, rate: f64) -> f64 {
-        let strain = self.softening * (delta / link).powi(2);
-        let softened = k * delta * strain.min(1.0 - LEAST_STIFFNESS);
+        let softened = k * delta * self.softened(delta / link).min(1.0 - LEAST_STIFFNESS);
         softened - self.moment_of_curvature.at(delta / link)[0] - self.friction(link, rate)[0]
+    }
+
+    /// The share of a joint's stiffness that softening takes at an elastic curvature (1/cm), before its limit.
+    pub fn softened(&self, curvature: f64) -> f64 {
+        if self.softening_exponent == 2.0 {
+            self.softening * curvature.powi(2)
+        } else {
+            let unit = SOFTENING_CURVATURE;
+            self.softening * unit * unit * (curvature.abs() / unit).powf(self.softening_exponent)
+        }
     }
 
     /// Moment against a joint's rate (rad/s) and its derivative (dyn·cm, dyn·cm·s): dry friction and the curve of the rate.

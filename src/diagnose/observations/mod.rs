@@ -137,7 +137,9 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
 
     // One cause at a time, then two constants; all that explain the numbers are listed.
     let mut fits: Vec<Fit> = Vec::new();
-    for (candidate, c) in plant.candidates.iter().enumerate().filter(|(_, c)| c.parameters.len() == 1 && !c.is_free_form) {
+    for (candidate, c) in
+        plant.candidates.iter().enumerate().filter(|(_, c)| c.parameters.len() == 1 && !c.is_free_form && !c.is_variant)
+    {
         progress(c.id);
         let tried = c.starts.iter().filter_map(|x| {
             let terms = vec![Term { candidate, x: x.clone() }];

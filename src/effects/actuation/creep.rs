@@ -33,7 +33,7 @@ pub const CREEP: Effect = Effect {
         Parameter {
             name: "per_decade",
             unit: "1/decade",
-            bounds: [-0.2, 0.3],
+            bounds: [0.0, 0.3],
             off: Some(0.0),
             default: None,
             about: "growth c of the step response in the decade about 1 s",
@@ -67,6 +67,7 @@ pub const CREEP: Effect = Effect {
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[
             Form {
                 fitted: &[("per_decade", 0.02), ("power", 0.2)],

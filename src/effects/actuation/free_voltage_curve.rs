@@ -136,6 +136,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
     places: &[Place::VoltageCurve],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[
                 ("below_1_v", 50.0),

@@ -1,7 +1,7 @@
-//! The strain follows the voltage with other delays.
+//! A part of the strain follows the voltage later.
 //!
 //! ```text
-//! θ_V = −γ·ℓ·(V + Σ w_j (q_j − V)),  q̇_j = (V − q_j)/T_j
+//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j
 //! ```
 //!
 //! # Parameters
@@ -22,8 +22,8 @@ use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, Shap
 pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
     id: "free-voltage-memory",
     kind: Kind::Actuation,
-    cause: "The strain follows the voltage with other delays.",
-    equation: "θ_V = −γ·ℓ·(V + Σ w_j (q_j − V)),  q̇_j = (V − q_j)/T_j",
+    cause: "A part of the strain follows the voltage later.",
+    equation: "θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j",
     source: "Kelvin-Voigt chain: Tschoegl, The Phenomenological Theory of Linear Viscoelastic Behavior, 1989.",
     parameters: &[
         Parameter {
@@ -86,6 +86,7 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[
                 ("share_1", 0.02),
@@ -115,7 +116,7 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
         y_unit: "",
         points: |p| TIMES.into_iter().zip(p).map(|(t, share)| [t, *share]).collect(),
     }),
-    action: Action::Voltages(|p, n, _| Box::new(Lags::new(TIMES.into_iter().zip(p.iter().copied()), n))),
+    action: Action::Voltages(|p, n, _| Box::new(Lags::beside(TIMES.into_iter().zip(p.iter().copied()), n))),
 };
 
 /// T_j (s).

@@ -86,6 +86,7 @@ pub const FREE_VOLTAGE_PLAYS: Effect = Effect {
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[
                 ("share_1", 0.05),

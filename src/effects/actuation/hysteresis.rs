@@ -104,6 +104,7 @@ pub const HYSTERESIS: Effect = Effect {
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[
             Form {
                 fitted: &[("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3)],

@@ -30,6 +30,7 @@ pub const PASSIVE_MARGIN: Effect = Effect {
     places: &[Place::GainAlong],
     fitting: Fitting::Candidate {
         on: fits::shape,
+        variants: &[],
         forms: &[Form { fitted: &[("fraction", 0.05)], starts: &[&[0.08]], given: &[] }],
     },
     shape: None,

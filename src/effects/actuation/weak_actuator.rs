@@ -27,6 +27,7 @@ pub const WEAK_ACTUATOR: Effect = Effect {
     places: &[Place::GainAlong],
     fitting: Fitting::Candidate {
         on: fits::several_actuators,
+        variants: &[],
         forms: &[Form { fitted: &[("gain", 0.1)], starts: &[&[0.95]], given: &[] }],
     },
     shape: None,

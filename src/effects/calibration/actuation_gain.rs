@@ -21,7 +21,11 @@ pub const ACTUATION_GAIN: Effect = Effect {
     source: "Free strain: Williams, thesis, 2004; shear lag in the bond: Crawley and de Luis 1987.",
     parameters: &[Parameter::scale([0.4, 2.0], "factor s on the curvature per volt")],
     places: &[Place::VoltageCurve],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        variants: &[],
+        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.gain_scale *= p[0]),
 };

@@ -21,7 +21,11 @@ pub const AREAL_MASS: Effect = Effect {
     source: "Derived; data sheet of the MFC actuator, Smart Material Corp.",
     parameters: &[Parameter::scale([0.5, 2.0], "factor s on the mass of every link")],
     places: &[Place::Mass],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        variants: &[],
+        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.mass_scale *= p[0]),
 };

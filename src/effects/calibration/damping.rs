@@ -23,6 +23,7 @@ pub const DAMPING: Effect = Effect {
     places: &[Place::JointMomentOfRate],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("scale", 0.3)], starts: &[&[1.5], &[4.0]], given: &[] }],
     },
     shape: None,

@@ -21,7 +21,11 @@ pub const STIFFNESS: Effect = Effect {
     source: "Derived from eq. 1; spread of MFC parameters: Hu, Smith, Hays, Oates, CDC-ECC 2011.",
     parameters: &[Parameter::scale([0.5, 2.0], "factor s on the stiffness k")],
     places: &[Place::Stiffness],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        variants: &[],
+        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }],
+    },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.stiffness_scale *= p[0]),
 };

@@ -1,40 +1,59 @@
 //! The source's resistance charges the actuator's capacitance.
 //!
 //! ```text
-//! T·dV_a/dt + V_a = V_c,  T = R·C
+//! b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C
 //! ```
 //!
 //! # Parameters
 //! * `time_constant_s` (s): time constant T
+//! * `inertia` (–): b: 0 is a resistance and a capacitance, ¼ two equal ones in a row; above ¼ the amplifier overshoots
 //!
 //! # Source
-//! Capacitance per area: data sheet of the MFC actuator; derived.
+//! Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems.
 
 use super::follower::{Follower, Law};
-use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const DRIVER_LAG: Effect = Effect {
     id: "driver-lag",
     kind: Kind::Driver,
     cause: "The source's resistance charges the actuator's capacitance.",
-    equation: "T·dV_a/dt + V_a = V_c,  T = R·C",
-    source: "Capacitance per area: data sheet of the MFC actuator; derived.",
-    parameters: &[Parameter {
-        name: "time_constant_s",
-        unit: "s",
-        bounds: [0.0, 0.2],
-        off: Some(0.0),
-        default: None,
-        about: "time constant T",
-    }],
+    equation: "b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C",
+    source: "Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems.",
+    parameters: &[
+        Parameter {
+            name: "time_constant_s",
+            unit: "s",
+            bounds: [0.0, 0.2],
+            off: Some(0.0),
+            default: None,
+            about: "time constant T",
+        },
+        Parameter {
+            name: "inertia",
+            unit: "",
+            bounds: [0.0, 4.0],
+            off: None,
+            default: Some(0.0),
+            about: "b: 0 is a resistance and a capacitance, ¼ two equal ones in a row; above ¼ the amplifier overshoots",
+        },
+    ],
     places: &[Place::Drive],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[Form {
+            fitted: &[("time_constant_s", 0.002), ("inertia", 0.2)],
+            starts: &[&[0.001, 0.3], &[0.005, 0.3]],
+            given: &[],
+        }],
         forms: &[Form { fitted: &[("time_constant_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
     },
     shape: None,
-    action: Action::Voltages(|p, n, _| Box::new(Follower::new(Lag { time: p[0] }, n))),
+    action: Action::Voltages(|p, n, _| match *p {
+        [time, inertia] if inertia > 0.0 => Box::new(SecondOrder { time, inertia, state: vec![[0.0; 2]; n] }),
+        _ => Box::new(Follower::new(Lag { time: p[0] }, n)),
+    }),
 };
 
 /// The state is the voltage at the end of the last step; exact for voltages that are constant over a step.
@@ -57,10 +76,87 @@ impl Law for Lag {
     }
 }
 
+/// The state is the voltage and T times its rate (V) at the end of the last step; exact for voltages that are constant over a step.
+struct SecondOrder {
+    /// T (s).
+    time: f64,
+    /// b.
+    inertia: f64,
+    state: Vec<[f64; 2]>,
+}
+
+impl SignalStage for SecondOrder {
+    fn settle(&mut self, volts: &mut [f64]) {
+        self.state.iter_mut().zip(volts).for_each(|(state, volts)| *state = [*volts, 0.0]);
+    }
+
+    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+        // exp(A s) = C·1 + S·(A + m·1) for A = [0, 1; −1/b, −1/b] with the mean −m and the squared half distance q² of its eigenvalues.
+        let (s, b) = (dt / self.time, self.inertia);
+        let m = 0.5 / b;
+        let q2 = m * m - 1.0 / b;
+        let q = q2.abs().sqrt();
+        let [cosine, sine] = if q * s < 1e-6 {
+            [(-m * s).exp(), s * (-m * s).exp()]
+        } else if q2 > 0.0 {
+            let [slow, fast] = [((q - m) * s).exp(), ((-q - m) * s).exp()];
+            [0.5 * (slow + fast), 0.5 * (slow - fast) / q]
+        } else {
+            [(-m * s).exp() * (q * s).cos(), (-m * s).exp() * (q * s).sin() / q]
+        };
+        for ([voltage, rate], volts) in self.state.iter_mut().zip(volts) {
+            let away = *voltage - *volts;
+            let next = [cosine * away + sine * (m * away + *rate), cosine * *rate - sine * (away / b + m * *rate)];
+            // The integral of the equation over the step.
+            let mean = -(b * (next[1] - *rate) + next[0] - away) / s;
+            [*voltage, *rate] = [*volts + next[0], next[1]];
+            *volts += mean;
+        }
+    }
+
+    fn memory(&self) -> Vec<f64> {
+        self.state.as_flattened().to_vec()
+    }
+
+    fn remember(&mut self, memory: &[f64]) {
+        self.state.as_flattened_mut().copy_from_slice(memory);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::SignalStage;
+
+    #[test]
+    fn two_equal_lags_in_a_row_are_an_inertia_of_a_quarter() {
+        let mut second = SecondOrder { time: 0.02, inertia: 0.25, state: vec![[0.0; 2]] };
+        let mut sum = 0.0;
+        for _ in 0..25 {
+            let mut volts = [100.0];
+            second.pass(1e-3, &mut volts);
+            sum += 1e-3 * volts[0];
+        }
+        // Of a step of u with two lags of T/2 each: u (1 − (1 + x) e^−x), x = 2 t/T.
+        let x = 2.5_f64;
+        assert!((second.state[0][0] - 100.0 * (1.0 - (1.0 + x) * (-x).exp())).abs() < 1e-9, "{:?}", second.state);
+        let integral = 100.0 * 0.01 * (x - 2.0 + (2.0 + x) * (-x).exp());
+        assert!((sum - integral).abs() < 1e-9, "{sum} {integral}");
+    }
+
+    #[test]
+    fn an_amplifier_that_overshoots_does_so_by_its_damping_ratio() {
+        // b T² = 1/ω², T = 2 ζ/ω: b = 1/(4 ζ²).
+        let ratio = 0.5_f64;
+        let mut second = SecondOrder { time: 0.02, inertia: 0.25 / (ratio * ratio), state: vec![[0.0; 2]] };
+        let mut largest = 0.0_f64;
+        for _ in 0..4000 {
+            second.pass(5e-5, &mut [100.0]);
+            largest = largest.max(second.state[0][0]);
+        }
+        let overshoot = (-std::f64::consts::PI * ratio / (1.0 - ratio * ratio).sqrt()).exp();
+        assert!((largest - 100.0 * (1.0 + overshoot)).abs() < 1e-3, "{largest}");
+        assert!((second.state[0][0] - 100.0).abs() < 1e-3);
+    }
 
     #[test]
     fn a_step_response_is_the_exponential() {

@@ -68,6 +68,7 @@ pub const FREE_DRIVE_FILTER: Effect = Effect {
     places: &[Place::Drive],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[("share_1", 0.2), ("share_2", 0.2), ("share_3", 0.2), ("share_4", 0.2), ("share_5", 0.2)],
             starts: &[

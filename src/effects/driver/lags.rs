@@ -2,8 +2,10 @@
 
 use crate::effects::SignalStage;
 
-/// `V + Σ w_j (q_j − V)` with `q̇_j = (V − q_j)/T_j`; exact for voltages that are constant over a step.
+/// `g V + Σ w_j (q_j − V)` with `q̇_j = (V − q_j)/T_j`; exact for voltages that are constant over a step.
 pub(in crate::effects) struct Lags {
+    /// g.
+    gain: f64,
     /// T_j (s) and w_j.
     elements: Vec<[f64; 2]>,
     /// q_j (V), elements × actuators.
@@ -12,16 +14,26 @@ pub(in crate::effects) struct Lags {
 }
 
 impl Lags {
-    /// Lags with time constants (s) and weights.
+    /// `V + Σ w_j (q_j − V)`: lags with time constants (s) and weights, by which the voltage comes later.
     pub(in crate::effects) fn new(elements: impl Iterator<Item = (f64, f64)>, actuators: usize) -> Self {
+        Self::with_gain(1.0, elements.map(|(time, weight)| [time, weight]).collect(), actuators)
+    }
+
+    /// `V + Σ w_j q_j`: the voltage at once, and more with time.
+    pub(in crate::effects) fn beside(elements: impl Iterator<Item = (f64, f64)>, actuators: usize) -> Self {
         let elements: Vec<[f64; 2]> = elements.map(|(time, weight)| [time, weight]).collect();
-        Self { behind: vec![0.0; elements.len() * actuators], elements, actuators }
+        Self::with_gain(1.0 + elements.iter().map(|[_, weight]| weight).sum::<f64>(), elements, actuators)
+    }
+
+    fn with_gain(gain: f64, elements: Vec<[f64; 2]>, actuators: usize) -> Self {
+        Self { gain, behind: vec![0.0; elements.len() * actuators], elements, actuators }
     }
 }
 
 impl SignalStage for Lags {
     fn settle(&mut self, volts: &mut [f64]) {
         self.behind.chunks_exact_mut(self.actuators).for_each(|q| q.copy_from_slice(volts));
+        volts.iter_mut().for_each(|volts| *volts *= self.gain);
     }
 
     fn pass(&mut self, dt: f64, volts: &mut [f64]) {
@@ -34,7 +46,7 @@ impl SignalStage for Lags {
                 away += weight * before * gone / steps;
                 q[i] = *volts + before * (1.0 - gone);
             }
-            *volts += away;
+            *volts = self.gain * *volts + away;
         }
     }
 

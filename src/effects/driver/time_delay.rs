@@ -23,6 +23,7 @@ pub const TIME_DELAY: Effect = Effect {
     places: &[Place::Drive],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("delay_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
     },
     shape: None,

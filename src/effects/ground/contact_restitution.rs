@@ -33,6 +33,7 @@ pub const CONTACT_RESTITUTION: Effect = Effect {
     places: &[Place::Impact],
     fitting: Fitting::Candidate {
         on: fits::on_the_floor,
+        variants: &[],
         forms: &[Form { fitted: &[("restitution", 0.1)], starts: &[&[0.1], &[0.4]], given: &[] }],
     },
     shape: None,

@@ -23,6 +23,7 @@ pub const GROUND_FRICTION: Effect = Effect {
     places: &[Place::FloorFriction],
     fitting: Fitting::Candidate {
         on: fits::on_the_floor,
+        variants: &[],
         forms: &[Form { fitted: &[("scale", 0.2)], starts: &[&[0.8], &[1.25]], given: &[] }],
     },
     shape: None,

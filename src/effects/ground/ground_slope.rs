@@ -30,6 +30,7 @@ pub const GROUND_SLOPE: Effect = Effect {
     places: &[Place::Floor],
     fitting: Fitting::Candidate {
         on: fits::on_the_floor,
+        variants: &[],
         forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.5]], given: &[] }],
     },
     shape: None,

@@ -51,6 +51,7 @@ pub const STICK_SLIP: Effect = Effect {
     places: &[Place::FloorFriction],
     fitting: Fitting::Candidate {
         on: fits::on_the_floor,
+        variants: &[],
         forms: &[Form { fitted: &[("static_ratio", 0.2)], starts: &[&[1.2]], given: &[] }],
     },
     shape: None,

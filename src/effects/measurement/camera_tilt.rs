@@ -30,6 +30,7 @@ pub const CAMERA_TILT: Effect = Effect {
     places: &[Place::Picture],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.3]], given: &[] }],
     },
     shape: None,

@@ -23,6 +23,7 @@ pub const SENSOR_DELAY: Effect = Effect {
     places: &[Place::Picture],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("delay_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
     },
     shape: None,

@@ -27,6 +27,7 @@ pub const SENSOR_OFFSET: Effect = Effect {
     places: &[Place::Picture],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("x_mm", 0.2), ("z_mm", 0.2)], starts: &[&[0.1, 0.1]], given: &[] }],
     },
     shape: None,

@@ -21,7 +21,11 @@ pub const SENSOR_SCALE: Effect = Effect {
     source: "From general knowledge.",
     parameters: &[Parameter::scale([0.5, 2.0], "factor s on positions")],
     places: &[Place::Picture],
-    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.02)], starts: &[&[1.02]], given: &[] }] },
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        variants: &[],
+        forms: &[Form { fitted: &[("scale", 0.02)], starts: &[&[1.02]], given: &[] }],
+    },
     shape: None,
     action: Action::View(|p, view| view.scale *= p[0]),
 };

@@ -1,14 +1,15 @@
 //! The sheet pushes air; the force grows with the square of the speed.
 //!
 //! ```text
-//! f = −½·ρ·C_d·w·v·|v|,  v normal to the sheet
+//! f = −½·ρ·C_d·w·v·|v|·(|v|/1 m/s)^(p − 2),  v normal to the sheet
 //! ```
 //!
 //! # Parameters
-//! * `drag_coefficient` (–): drag coefficient C_d
+//! * `drag_coefficient` (–): drag coefficient C_d, with another exponent than 2 that at 1 m/s
+//! * `exponent` (–): power p of the speed
 //!
 //! # Source
-//! Textbook drag of a plate; sizes derived.
+//! Textbook drag of a plate; sizes derived. Between 1 (Stokes) and 2: Schlichting, Boundary-Layer Theory.
 
 use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
@@ -17,21 +18,39 @@ pub const AIR_DRAG: Effect = Effect {
     id: "air-drag",
     kind: Kind::Structure,
     cause: "The sheet pushes air; the force grows with the square of the speed.",
-    equation: "f = −½·ρ·C_d·w·v·|v|,  v normal to the sheet",
-    source: "Textbook drag of a plate; sizes derived.",
-    parameters: &[Parameter {
-        name: "drag_coefficient",
-        unit: "",
-        bounds: [0.0, 40.0],
-        off: Some(0.0),
-        default: None,
-        about: "drag coefficient C_d",
-    }],
+    equation: "f = −½·ρ·C_d·w·v·|v|·(|v|/1 m/s)^(p − 2),  v normal to the sheet",
+    source: "Textbook drag of a plate; sizes derived. Between 1 (Stokes) and 2: Schlichting, Boundary-Layer Theory.",
+    parameters: &[
+        Parameter {
+            name: "drag_coefficient",
+            unit: "",
+            bounds: [0.0, 40.0],
+            off: Some(0.0),
+            default: None,
+            about: "drag coefficient C_d, with another exponent than 2 that at 1 m/s",
+        },
+        Parameter {
+            name: "exponent",
+            unit: "",
+            bounds: [0.5, 4.0],
+            off: None,
+            default: Some(2.0),
+            about: "power p of the speed",
+        },
+    ],
     places: &[Place::Air],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[Form {
+            fitted: &[("drag_coefficient", 1.0), ("exponent", 0.3)],
+            starts: &[&[1.0, 1.5], &[4.0, 1.5]],
+            given: &[],
+        }],
         forms: &[Form { fitted: &[("drag_coefficient", 1.0)], starts: &[&[1.0], &[4.0]], given: &[] }],
     },
     shape: None,
-    action: Action::Robot(|p, robot| robot.extensions.drag[1] += p[0]),
+    action: Action::Robot(|p, robot| match *p {
+        [coefficient, exponent] if exponent != 2.0 => robot.extensions.drag_of_power = [coefficient, exponent],
+        _ => robot.extensions.drag[1] += p[0],
+    }),
 };

@@ -1,14 +1,15 @@
 //! The clamp gives, so the root turns in proportion to the moment on it.
 //!
 //! ```text
-//! φ = c·M_root
+//! φ + T·φ̇ = c·M_root
 //! ```
 //!
 //! # Parameters
 //! * `compliance_rad_per_n_m` (rad/(N·m)): turn c of the root per moment
+//! * `damping_s` (s): T: damping of the clamp over its stiffness
 //!
 //! # Source
-//! J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived.
+//! J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived. Damping: Kelvin and Voigt’s element.
 
 use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
@@ -17,21 +18,39 @@ pub const CLAMP_COMPLIANCE: Effect = Effect {
     id: "clamp-compliance",
     kind: Kind::Structure,
     cause: "The clamp gives, so the root turns in proportion to the moment on it.",
-    equation: "φ = c·M_root",
-    source: "J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived.",
-    parameters: &[Parameter {
-        name: "compliance_rad_per_n_m",
-        unit: "rad/(N·m)",
-        bounds: [0.0, 10.0],
-        off: Some(0.0),
-        default: None,
-        about: "turn c of the root per moment",
-    }],
+    equation: "φ + T·φ̇ = c·M_root",
+    source: "J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived. Damping: Kelvin and Voigt’s element.",
+    parameters: &[
+        Parameter {
+            name: "compliance_rad_per_n_m",
+            unit: "rad/(N·m)",
+            bounds: [0.0, 10.0],
+            off: Some(0.0),
+            default: None,
+            about: "turn c of the root per moment",
+        },
+        Parameter {
+            name: "damping_s",
+            unit: "s",
+            bounds: [0.0, 1.0],
+            off: None,
+            default: Some(0.0),
+            about: "T: damping of the clamp over its stiffness",
+        },
+    ],
     places: &[Place::Clamp],
     fitting: Fitting::Candidate {
         on: fits::clamped,
+        variants: &[Form {
+            fitted: &[("compliance_rad_per_n_m", 0.5), ("damping_s", 2e-3)],
+            starts: &[&[0.2, 2e-3], &[1.0, 2e-3]],
+            given: &[],
+        }],
         forms: &[Form { fitted: &[("compliance_rad_per_n_m", 0.5)], starts: &[&[0.2], &[1.0]], given: &[] }],
     },
     shape: None,
-    action: Action::Robot(|p, robot| robot.extensions.clamp_compliance += 1e-7 * p[0]),
+    action: Action::Robot(|p, robot| {
+        robot.extensions.clamp_compliance += 1e-7 * p[0];
+        robot.extensions.clamp_damping = p[1];
+    }),
 };

@@ -50,6 +50,7 @@ pub const FREE_DRAG: Effect = Effect {
     places: &[Place::Air],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[("linear", 1.0), ("quadratic", 1.0), ("cubic", 1.0)],
             starts: &[&[1.0, 0.0, 0.0], &[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0]],

@@ -69,6 +69,7 @@ pub const FREE_JOINT_MEMORY: Effect = Effect {
     places: &[Place::JointMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[("share_1", 0.02), ("share_2", 0.02), ("share_3", 0.02), ("share_4", 0.02), ("share_5", 0.02)],
             starts: &[

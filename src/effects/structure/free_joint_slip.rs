@@ -78,6 +78,7 @@ pub const FREE_JOINT_SLIP: Effect = Effect {
     places: &[Place::JointMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[
                 ("moment_1_mn_m", 0.1),

@@ -60,6 +60,7 @@ pub const FREE_MASS: Effect = Effect {
     places: &[Place::Mass],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[("mass_1_g", 0.1), ("mass_2_g", 0.1), ("mass_3_g", 0.1), ("mass_4_g", 0.1)],
             starts: &[&[0.1, 0.0, 0.0, 0.0], &[0.0, 0.1, 0.0, 0.0], &[0.0, 0.0, 0.1, 0.0], &[0.0, 0.0, 0.0, 0.1]],

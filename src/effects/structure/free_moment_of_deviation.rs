@@ -135,6 +135,7 @@ pub const FREE_MOMENT_OF_DEVIATION: Effect = Effect {
     places: &[Place::JointMomentOfDeviation],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[
                 ("below_1_mn_m", 0.5),

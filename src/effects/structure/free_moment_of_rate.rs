@@ -81,6 +81,7 @@ pub const FREE_MOMENT_OF_RATE: Effect = Effect {
     places: &[Place::JointMomentOfRate],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form {
             fitted: &[
                 ("moment_1_mn_m", 0.1),

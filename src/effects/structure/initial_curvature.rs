@@ -41,6 +41,7 @@ pub const INITIAL_CURVATURE: Effect = Effect {
     places: &[Place::RestShape],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("curvature_per_m", 0.2)], starts: &[&[0.1]], given: &[] }],
     },
     shape: None,

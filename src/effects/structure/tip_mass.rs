@@ -35,6 +35,7 @@ pub const TIP_MASS: Effect = Effect {
     places: &[Place::Mass],
     fitting: Fitting::Candidate {
         on: fits::any,
+        variants: &[],
         forms: &[Form { fitted: &[("mass_g", 0.1)], starts: &[&[0.05], &[0.2]], given: &[] }],
     },
     shape: None,

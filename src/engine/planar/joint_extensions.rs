@@ -102,10 +102,14 @@ impl JointExtensions {
         let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
         if self.softening != 0.0 {
             let most = 1.0 - LEAST_STIFFNESS;
-            let share = |delta: f64| self.softening * delta * delta;
+            let exponent = self.extensions.softening_exponent;
+            let share = |delta: f64| match exponent {
+                2.0 => self.softening * delta * delta,
+                _ => self.extensions.softened(delta / self.link),
+            };
             let stiffness = self.joint[k] * quad.stiffness;
             torque = stiffness * delta.map(|delta| share(delta).min(most) * delta);
-            slope = stiffness * delta.map(|delta| if share(delta) < most { 3.0 * share(delta) } else { most });
+            slope = stiffness * delta.map(|delta| if share(delta) < most { (exponent + 1.0) * share(delta) } else { most });
         }
         let curve = &self.extensions.moment_of_curvature;
         if !curve.is_zero() {

@@ -176,11 +176,11 @@ impl PlanarEngine {
         let blocks = if robot.mount == Mount::Ground && levels > LONGEST_WHOLE { levels.div_ceil(BLOCK) } else { 0 };
         let (mut quads, frictions) = bodies_in_quads(robot, &segments, &bodies, root, levels);
         let base_joint = match robot.mount {
-            Mount::Clamped if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged,
+            Mount::Clamped if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged { damping_time: extensions.clamp_damping },
             Mount::Clamped => BaseJoint::Clamped,
             _ => BaseJoint::Free,
         };
-        if base_joint == BaseJoint::Hinged {
+        if let BaseJoint::Hinged { .. } = base_joint {
             quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
         set_implicit(&mut quads, &joint, base_joint, weight, time_step);

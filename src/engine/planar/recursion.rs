@@ -176,14 +176,17 @@ impl Articulated {
 }
 
 /// How the root is joined to the world.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum BaseJoint {
     /// Not at all.
     Free,
     /// Rigidly.
     Clamped,
     /// By a hinge at its reference point, with the level's own torque and implicit terms.
-    Hinged,
+    Hinged {
+        /// Damping over stiffness (s).
+        damping_time: f64,
+    },
 }
 
 /// Tree levels of a block; an even number. A part of a long chain is a run of blocks.
@@ -209,7 +212,7 @@ fn root_motion<const SKEW: bool>(
         return Default::default();
     }
     let mut whole = chain.at_root::<SKEW>(through, root);
-    if base_joint == BaseJoint::Hinged {
+    if let BaseJoint::Hinged { .. } = base_joint {
         let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
         return (whole, [turn, 0.0, 0.0]);
     }

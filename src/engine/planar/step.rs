@@ -164,8 +164,8 @@ pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: B
     for quad in quads.iter_mut() {
         quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
     }
-    if base_joint == BaseJoint::Hinged {
+    if let BaseJoint::Hinged { damping_time } = base_joint {
         let stiffness = quads[0].stiffness.lane(0);
-        quads[0].implicit.set_lane(0, weight * time_step * stiffness * 0.5 * time_step);
+        quads[0].implicit.set_lane(0, weight * time_step * stiffness * (damping_time + 0.5 * time_step));
     }
 }
