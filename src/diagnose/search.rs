@@ -552,7 +552,8 @@ impl Search<'_> {
                 |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
             let top = match (top_of(false).cloned(), top_of(true).cloned()) {
                 (Some(named), Some(free)) if self.is_closer(&free, &named) => {
-                    let named = self.with_its_law(named)?;
+                    let last = named.model().terms.len() - 1;
+                    let named = self.with_its_law(named, last)?;
                     Some(if self.is_closer(&free, &named) { free } else { named })
                 }
                 (named, free) => named.or(free),
@@ -568,10 +569,12 @@ impl Search<'_> {
                 first.get_or_insert(trials);
                 break;
             };
-            // The law and the discretisation are refined before another cause could take their errors.
-            let worthy = self.with_its_law(worthy)?;
+            // The discretisation and the laws are refined before another cause could take their errors.
             let settled = self.settle(worthy)?;
             best = self.resolve(settled)?;
+            for index in 0..best.model().terms.len() {
+                best = self.with_its_law(best, index)?;
+            }
             if first.is_none() {
                 first = Some(trials);
             }
@@ -582,14 +585,14 @@ impl Search<'_> {
         Ok((best, first.unwrap_or_default()))
     }
 
-    /// The model with another law of its last term's cause, if that is significantly better.
+    /// The model with another law of the cause of term `index`, if that is significantly better.
     ///
     /// # Errors
     /// [`DiagnoseError`] if a better law cannot be fitted to the end.
-    fn with_its_law(&self, scored: Scored) -> Result<Scored, DiagnoseError> {
-        let Some(last) = scored.model().terms.last().cloned() else { return Ok(scored) };
-        let own = self.candidate(&last);
-        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| last.x[at]);
+    fn with_its_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
+        let term = &scored.model().terms[index];
+        let own = self.candidate(term);
+        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
         for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
             if variant.id != own.id || !variant.is_variant || own.is_variant {
@@ -604,8 +607,7 @@ impl Search<'_> {
                 }
                 (self.progress)(&format!("another law of {}", own.id));
                 let mut model = scored.model().clone();
-                model.terms.pop();
-                model.terms.push(Term { candidate, x: x.clone() });
+                model.terms[index] = Term { candidate, x: x.clone() };
                 tried.push(x);
                 let Ok(other) = self.ranked(&model) else { continue };
                 if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
