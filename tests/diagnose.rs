@@ -227,6 +227,55 @@ fn bad_data_are_refused_with_file_line_and_column() {
 }
 
 #[test]
+fn files_shapes_and_robots_of_a_run_are_checked_and_named_with_their_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("a.csv", "t_s,tip_z_mm\n0,1\n0.1,1\n0.2,2\n");
+    write("v.csv", "t_s,v1_v\n5,0\n6,0\n");
+    write("w.csv", "t_s,v1_v,tip_z_mm\n0,0,1\n1,0,1\n");
+    let released = |keys: &str| format!("{HEAD}{RUN}start = \"released\"\n[run.release]\n{keys}\n");
+    // The run's table is line 8, its further keys line 11 and on.
+    for (toml, code, words) in [
+        (format!("{HEAD}{RUN}"), 3, vec!["a.csv, line 1", "v1_v is missing", "voltage_file"]),
+        (format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n"), 3, vec!["a.csv", "does not overlap", "from 0 to 0.2", "from 5 to 6"]),
+        (format!("{HEAD}{RUN}voltage_file = \"w.csv\"\n"), 3, vec!["w.csv, line 1, column 3", "tip_z_mm"]),
+        (
+            format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n").replace("a.csv", "w.csv"),
+            3,
+            vec!["w.csv, line 1, column 2", "voltage_file"],
+        ),
+        (format!("{HEAD}{RUN}voltage_file = \"x.csv\"\n"), 3, vec!["x.csv"]),
+        (format!("{HEAD}{RUN}start = \"released\"\n"), 2, vec!["line 11", "without a shape", "hung_g", "level", "held"]),
+        (format!("{HEAD}{RUN}start = \"let go\"\n"), 2, vec!["line 11", "start", "released"]),
+        (format!("{HEAD}{RUN}[run.release]\nlevel = true\n"), 2, vec!["line 11", "start = \"released\""]),
+        (released("at_s = 0.1"), 2, vec!["line 12", "no shape"]),
+        (released("level = false"), 2, vec!["line 12", "no shape"]),
+        (released("level = true\nhung_g = 1"), 2, vec!["line 12", "more than one"]),
+        (released("hung_g = -1"), 2, vec!["line 13", "hung_g", "-1"]),
+        (released("held = \"nose\"\nheld_z_mm = 3"), 2, vec!["line 13", "nose", "tip"]),
+        (released("held = \"tip\"\nheld_z_mm = 99"), 2, vec!["line 14", "held_z_mm", "99"]),
+        (released("level = true\nat_s = 7"), 2, vec!["line 14", "at_s", "from 0 to 0.2"]),
+        (released("level = true\nfrom = 7"), 2, vec!["line 14", "from"]),
+        (released("level = true\n[run.robot]\nactuators = 2"), 2, vec!["line 15", "actuators", "a file of its own"]),
+        (released("level = true\n[run.material]\nactuator_length_mm = 50"), 2, vec!["100 mm", "50 mm long", "[run.markers]"]),
+        (released("level = true\n[run.material]\nactuator_length_mm = -5"), 2, vec!["line 15", "actuator_length_mm", "-5"]),
+        (released("level = true\n[run.markers]\nnose = 5"), 2, vec!["line 15", "nose"]),
+        (released("level = true\n[[run.effect]]\nid = \"hysteresis\""), 2, vec!["line 14", "structure", "tip-mass"]),
+        (released("level = true\n[[run.effect]]\nid = \"tip-mass\"\nmass_g = -1"), 2, vec!["line 14", "mass_g", "-1"]),
+        (format!("[[effect]]\nid = \"creep\"\n{}", released("level = true")), 2, vec!["line 1", "creep", "structure"]),
+        (format!("[columns]\ntip_y_mm = {{ from = \"y\" }}\n{}", released("level = true")), 2, vec!["line 2", "tip_y_mm"]),
+        (format!("[columns]\nt_s = {{ from = \"t\", factor = 0 }}\n{}", released("level = true")), 2, vec!["line 2", "factor"]),
+    ] {
+        write("x.toml", &toml);
+        let output = sfers(folder.path(), &["diagnose", "x.toml", "--out", "d"]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{toml}: {text}");
+        assert!(words.iter().all(|word| text.contains(word)), "{words:?} in {text}\n{toml}");
+        assert!(!folder.path().join("d").exists(), "{toml}");
+    }
+}
+
+#[test]
 fn one_run_is_too_little_to_decide_and_the_diagnosis_says_so() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("x.toml"), format!("{HEAD}{RUN}")).unwrap();

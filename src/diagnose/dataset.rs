@@ -1,6 +1,9 @@
 //! Measured data: a description in TOML and one CSV per run.
 
 mod read;
+mod run;
+
+pub(super) use run::overridden;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -8,7 +11,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use thiserror::Error;
 
-use crate::experiment::{Config, ConfigError, DriveConfig, MaterialConfig, RobotConfig, SimulationConfig};
+use crate::experiment::{Config, ConfigError, DriveConfig, EffectConfig, MaterialConfig, RobotConfig, SimulationConfig};
 use crate::model::Robot;
 
 /// Most time steps of a run: a prediction then takes some seconds, and a diagnosis needs hundreds.
@@ -53,8 +56,28 @@ pub(crate) struct Description {
     markers: BTreeMap<String, f64>,
     noise: BTreeMap<String, f64>,
     bench: Bench,
+    columns: BTreeMap<String, Column>,
+    effect: Vec<EffectConfig>,
     run: Vec<RunEntry>,
     observation: Vec<Observation>,
+}
+
+/// A column of this program in a file that calls it otherwise or has another unit: value = `factor` × number + `offset`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Column {
+    /// Its name in the file.
+    pub from: String,
+    /// In the unit of its key per unit of the file.
+    #[serde(default = "one")]
+    pub factor: f64,
+    /// In the unit of its key.
+    #[serde(default)]
+    pub offset: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -95,8 +118,49 @@ impl Bench {
 pub(crate) struct RunEntry {
     id: String,
     file: PathBuf,
+    voltage_file: Option<PathBuf>,
     #[serde(default)]
     role: Role,
+    start: Option<String>,
+    release: Option<Release>,
+    #[serde(default)]
+    robot: RobotConfig,
+    #[serde(default)]
+    material: MaterialConfig,
+    #[serde(default)]
+    markers: BTreeMap<String, f64>,
+    #[serde(default)]
+    effect: Vec<EffectConfig>,
+}
+
+/// `[run.release]`: the shape that a run is let go from at rest, and when.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Release {
+    hung_g: Option<f64>,
+    level: Option<bool>,
+    held: Option<String>,
+    held_z_mm: Option<f64>,
+    at_s: Option<f64>,
+}
+
+/// The state of a run at its start. The robot is at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Start {
+    /// In equilibrium under gravity and the first voltages.
+    #[default]
+    Settled,
+    /// All joints at zero angle.
+    Level,
+    /// In equilibrium with a mass (g) at the right end that is taken away.
+    Hung(f64),
+    /// In equilibrium with the point at `position` (cm along the robot) held at the height `z` (cm) by a vertical force.
+    Held {
+        /// Distance of the point from the left end along the robot (cm).
+        position: f64,
+        /// Its height above the left end of the flat robot (cm).
+        z: f64,
+    },
 }
 
 /// A single measured number and the conditions of its measurement.
@@ -155,12 +219,40 @@ pub struct MeasuredRun {
     pub role: Role,
     /// Times (s).
     pub times: Vec<f64>,
-    /// Voltages (V), rows × actuators.
+    /// Voltages (V) at these times, rows × actuators.
     pub voltages: Vec<f64>,
+    /// The voltages in rows of their own, if a file of their own has them.
+    pub log: Option<Log>,
+    /// The time (s) at which its motion starts.
+    pub origin: f64,
+    /// Its state then.
+    pub start: Start,
+    /// Its nominal experiment without drive.
+    pub nominal: Config,
+    /// Its nominal robot.
+    pub robot: Robot,
+    /// Positions of the markers along its robot (cm), in the order of the data set's.
+    pub positions: Vec<f64>,
     /// Positions (mm), channels × rows. Channels are x and z of every marker, in order; one that was not measured is empty.
     pub channels: Vec<Vec<f64>>,
     /// Remarks on the data, in words.
     pub remarks: Vec<String>,
+}
+
+/// Voltages on a clock of their own.
+#[derive(Debug, Clone)]
+pub struct Log {
+    /// Times (s).
+    pub times: Vec<f64>,
+    /// Voltages (V), rows × actuators.
+    pub voltages: Vec<f64>,
+}
+
+impl MeasuredRun {
+    /// Times (s) and voltages (V, rows × actuators) of the command.
+    pub fn command(&self) -> (&[f64], &[f64]) {
+        self.log.as_ref().map_or((&self.times, &self.voltages), |log| (&log.times, &log.voltages))
+    }
 }
 
 /// A data set.

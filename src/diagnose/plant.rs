@@ -140,6 +140,11 @@ pub trait Plant: Sync {
         0
     }
 
+    /// True for a run that moves under a constant input, as one that is released from another shape than its equilibrium.
+    fn moves_unaided(&self, _run: usize) -> bool {
+        false
+    }
+
     /// Standard deviations of the bench's faults that are known, in the order of [`Spread::of`]; the others are estimated.
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         [None; bench::KINDS]

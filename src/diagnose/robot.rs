@@ -5,14 +5,14 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
-use super::dataset::{Bench, Dataset};
+use super::dataset::{Bench, Dataset, Start};
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::track::{ON_STEP, track};
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
-use crate::effects::{self, Applied, EffectError, SignalChain, View};
+use crate::effects::{self, Applied, EffectError, Kind, SignalChain, View};
 use crate::model::{Mount, PointMass, Robot};
 
 /// Joints per actuator that are tried; more change a cantilever's first frequency by less than 0.06 %.
@@ -23,6 +23,8 @@ const JOINTS_ON_THE_FLOOR: usize = 8;
 const STEPS_PER_PERIOD: f64 = 220.0;
 /// Time step of a robot on the ground (s), short enough for impacts.
 const GROUND_STEP: f64 = 1e-4;
+/// Kinds of effects that do nothing at 0 V.
+const ON_VOLTAGES: [Kind; 2] = [Kind::Driver, Kind::Actuation];
 /// Largest change of a run's prediction by a longer time step (rms, in σ).
 const LARGEST_CHANGE: f64 = 0.15;
 
@@ -42,36 +44,48 @@ pub struct Scene {
     pub markers: Vec<f64>,
 }
 
+/// A run to be simulated.
+struct Run {
+    robot: Robot,
+    /// Marker positions along the robot (cm).
+    markers: Vec<f64>,
+    command: Command,
+    start: Start,
+    /// Time at which it starts (s).
+    origin: f64,
+    /// Time from there to its last row (s).
+    duration: f64,
+    /// Time step (s).
+    step: f64,
+}
+
 /// A data set with its robot.
 pub struct RobotPlant {
     robot: Robot,
     /// Marker positions along the robot (cm).
     markers: Vec<f64>,
     channels: Vec<String>,
-    commands: Vec<Command>,
+    runs: Vec<Run>,
     signals: Vec<Signal>,
-    /// Time of each run's first row (s).
-    starts: Vec<f64>,
-    /// Length of each run (s).
-    durations: Vec<f64>,
-    /// Time step of each run (s).
-    steps: Vec<f64>,
     candidates: Vec<Candidate>,
     bench: Bench,
+    /// True if there is no voltage in any run.
+    without_voltage: bool,
 }
 
 impl RobotPlant {
     /// The plant of a data set, with the noise and masks that [`quality::check`] returned for it.
     pub fn new(dataset: &Dataset, checked: &quality::Checked) -> Self {
-        let robot = dataset.robot.clone();
-        let gain = dataset.nominal.robot.positive_gain.unwrap_or(1.0);
-        let (mut commands, mut signals, mut starts, mut steps) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let n = dataset.robot.actuators;
+        let (mut runs, mut signals) = (Vec::new(), Vec::new());
         for (run, masks) in dataset.runs.iter().zip(&checked.runs) {
-            let n = robot.actuators;
-            let start = run.times[0];
-            let times: Vec<f64> = run.times.iter().map(|t| t - start).collect();
-            let volts: Vec<f64> = run.voltages.iter().map(|v| if *v > 0.0 { v * gain } else { *v }).collect();
-            commands.push(Command::new(&times, &volts, n));
+            let robot = run.robot.clone();
+            let gain = run.nominal.robot.positive_gain.unwrap_or(1.0);
+            let times: Vec<f64> = run.times.iter().map(|t| t - run.origin).collect();
+            let (command_times, volts) = run.command();
+            let command_times: Vec<f64> = command_times.iter().map(|t| t - run.origin).collect();
+            let volts: Vec<f64> = volts.iter().map(|v| if *v > 0.0 { v * gain } else { *v }).collect();
+            let command = Command::new(&command_times, &volts, n);
             let mut signal = Signal {
                 id: run.id.clone(),
                 values: Vec::new(),
@@ -90,35 +104,48 @@ impl RobotPlant {
                 }
             }
             signals.push(signal);
-            starts.push(start);
-            steps.push(step(&robot, &times));
+            runs.push(Run {
+                step: step(&robot, &times),
+                robot,
+                markers: run.positions.clone(),
+                command,
+                start: run.start,
+                origin: run.origin,
+                duration: times[times.len() - 1],
+            });
         }
-        let candidates = candidates(&robot, dataset.markers.len());
+        let mut candidates = candidates(&dataset.robot, dataset.markers.len());
+        let without_voltage = dataset.runs.iter().all(|run| run.command().1.iter().all(|v| *v == 0.0));
+        if without_voltage {
+            // What acts on voltages does nothing without any.
+            candidates.retain(|c| {
+                effects::find(c.id).is_none_or(|effect| !ON_VOLTAGES.contains(&effect.kind)) && c.id != "actuation-gain"
+            });
+        }
         let plant = Self {
+            robot: dataset.robot.clone(),
             markers: dataset.markers.iter().map(|marker| marker.position).collect(),
             channels: dataset.channel_names(),
-            robot,
-            commands,
+            runs,
             signals,
-            starts,
-            durations: dataset.runs.iter().map(|run| run.times[run.times.len() - 1] - run.times[0]).collect(),
-            steps,
             candidates,
             bench: dataset.bench,
+            without_voltage,
         };
         plant.with_chosen_steps()
     }
 
     /// Sets each run's time step to the longest that keeps its prediction within [`LARGEST_CHANGE`].
     fn with_chosen_steps(mut self) -> Self {
-        let runs = 0..self.signals.len();
-        self.steps = runs.into_par_iter().map(|run| self.longest_step(run)).collect();
+        let steps: Vec<f64> = (0..self.runs.len()).into_par_iter().map(|run| self.longest_step(run)).collect();
+        self.runs.iter_mut().zip(steps).for_each(|(run, step)| run.step = step);
         self
     }
 
     fn longest_step(&self, run: usize) -> f64 {
-        let finest = self.steps[run];
-        let limit = 0.09 / (analytic::cantilever_frequency(&self.robot) * (self.robot.actuators as f64).powi(2));
+        let Run { robot, step: finest, .. } = &self.runs[run];
+        let finest = *finest;
+        let limit = 0.09 / (analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2));
         let ends = Nuisance { shares: vec![1.0; self.nuisances(run)], ..Nuisance::default() };
         let with = |step: f64| self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok();
         let (Some(fine), Mount::Clamped) = (with(finest), self.robot.mount) else { return finest };
@@ -138,22 +165,22 @@ impl RobotPlant {
 
     /// The time step (s) of a run.
     pub fn step(&self, run: usize) -> f64 {
-        self.steps[run]
+        self.runs[run].step
     }
 
-    /// The time (s) of a run's first row.
+    /// The time (s) at which a run starts, on the clock of its file.
     pub fn start(&self, run: usize) -> f64 {
-        self.starts[run]
+        self.runs[run].origin
     }
 
     /// The number of steps of `step` (s) that a run takes: one beyond its last row, so that the state there is recorded.
     pub fn steps_of(&self, run: usize, step: f64) -> u64 {
-        (self.durations[run] / step - ON_STEP).ceil().max(0.0) as u64 + 1
+        (self.runs[run].duration / step - ON_STEP).ceil().max(0.0) as u64 + 1
     }
 
     /// The command of a run.
     pub fn command(&self, run: usize) -> &Command {
-        &self.commands[run]
+        &self.runs[run].command
     }
 
     /// Marker positions along the robot (cm).
@@ -183,8 +210,9 @@ impl RobotPlant {
         let Setup { robot, drive, chain, view } =
             self.setup(robot, &model.terms, model.resolution, scene.drive.clone(), scene.duration)?;
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
-        let step = self.steps.iter().copied().fold(1e-3, f64::min);
-        let tracks = track(&robot, scene.hung, &drive, chain, step, &scene.markers, &times)?;
+        let step = self.runs.iter().map(|run| run.step).fold(1e-3, f64::min);
+        let start = if scene.hung > 0.0 { Start::Hung(scene.hung) } else { Start::Settled };
+        let tracks = track(&robot, &start, &drive, chain, step, &scene.markers, &times)?;
         Ok(tracks.into_iter().flat_map(|at| view.of(at).map(|x| 10.0 * x)).collect())
     }
 
@@ -240,11 +268,19 @@ impl Plant for RobotPlant {
     }
 
     fn nuisances(&self, run: usize) -> usize {
-        self.commands[run].jumps().len()
+        self.runs[run].command.jumps().len()
+    }
+
+    fn moves_unaided(&self, run: usize) -> bool {
+        self.runs[run].start != Start::Settled
     }
 
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         let Bench { clock_ms, zero_mm, gain, drift_mm_per_s } = self.bench;
+        if self.without_voltage {
+            // There is no gain, and no second clock: its offset is that of the release.
+            return [clock_ms.map(|ms| 1e-3 * ms), Some(0.0), Some(0.0), gain, zero_mm, drift_mm_per_s];
+        }
         // A given gain is that of the voltage; the camera's scale then has none of its own.
         [clock_ms.map(|ms| 1e-3 * ms), None, gain, gain.map(|_| 0.0), zero_mm, drift_mm_per_s]
     }
@@ -301,17 +337,18 @@ impl RobotPlant {
         nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let table = self.commands[run].table(&nuisance.shares, nuisance.base[Spread::GAIN]);
+        let Run { robot, markers, command, start, .. } = &self.runs[run];
+        let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
         let Setup { robot, drive, chain, view } =
-            self.setup(self.robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
+            self.setup(robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
         // Channels share their times.
         let mut times = signal.times.clone();
         times.sort_by(f64::total_cmp);
         times.dedup();
         let seen: Vec<f64> = times.iter().map(|t| (nuisance.time(*t) - view.delay).max(0.0)).collect();
-        let tracks = track(&robot, 0.0, &drive, chain, step, &self.markers, &seen)?;
-        let n = self.markers.len();
+        let tracks = track(&robot, start, &drive, chain, step, markers, &seen)?;
+        let n = markers.len();
         let at = |(t, channel): (&f64, &usize)| {
             let row = times.partition_point(|time| time < t);
             let seen = view.of(tracks[row * n + channel / 2]);

@@ -40,13 +40,15 @@ fn the_tables_have_the_keys_that_the_parser_accepts_and_no_others() {
     assert_eq!(listed(&sweep::TOP), accepted::<crate::sweep::File>(""));
     assert_eq!(listed(&sweep::RANGE), accepted::<crate::sweep::Range>(""));
 
-    let tables = ["dataset", "material", "robot", "markers", "noise", "bench", "run", "observation"];
+    let tables = ["dataset", "material", "robot", "markers", "noise", "bench", "columns", "effect", "run", "observation"];
     assert_eq!(accepted::<Description>(""), tables.map(String::from).into());
     let sections: BTreeSet<_> = super::FILES[2].sections.iter().map(|section| section.name).collect();
-    assert_eq!(sections, tables.into_iter().chain(["robot.friction"]).collect());
+    assert_eq!(sections, tables.into_iter().chain(["robot.friction", "run.release"]).collect());
     assert_eq!(listed(&dataset::DATASET), accepted::<crate::diagnose::dataset::About>(""));
     assert_eq!(listed(&dataset::BENCH), accepted::<crate::diagnose::dataset::Bench>(""));
     assert_eq!(listed(&dataset::RUN), accepted::<crate::diagnose::dataset::RunEntry>(""));
+    assert_eq!(listed(&dataset::RELEASE), accepted::<crate::diagnose::dataset::Release>(""));
+    assert_eq!(listed(&dataset::COLUMNS), accepted::<crate::diagnose::dataset::Column>(""));
     assert_eq!(listed(&dataset::OBSERVATION), accepted::<crate::diagnose::dataset::Observation>(""));
 }
 

@@ -24,6 +24,8 @@ const LARGEST_TURN: f64 = 0.2;
 /// A step that turns no body by more than this (rad) is the last.
 const SETTLED: f64 = 1e-13;
 const LARGEST_STEPS: u32 = 2000;
+/// After this many steps without progress the next ones are half as long: where weights bend the robot more than its stiffness bears, whole ones overshoot.
+const STEPS_TO_PROGRESS: u32 = 100;
 
 impl PlanarEngine {
     /// Puts the robot at rest into its equilibrium under constant `voltages` (V, one per actuator), gravity and the floor.
@@ -67,7 +69,8 @@ impl PlanarEngine {
         let weight = (self.mass * self.gravity).max(f64::MIN_POSITIVE);
         let law = ContactLaw::statics(weight / GIVE);
         let zero = Four::splat(simd, 0.0);
-        for _ in 0..LARGEST_STEPS {
+        let (mut relaxation, mut least_turn) = (1.0, f64::INFINITY);
+        for step in 1..=LARGEST_STEPS {
             let mut before = Two::splat(simd, 0.0);
             for (k, (quad, body)) in self.quads.iter_mut().zip(bodies).enumerate() {
                 quad.posed = quad.angle;
@@ -89,7 +92,11 @@ impl PlanarEngine {
             if !largest.is_finite() {
                 return Ok(false);
             }
-            let share = (LARGEST_TURN / largest).min(1.0);
+            if step % STEPS_TO_PROGRESS == 0 {
+                relaxation *= if largest < least_turn { 1.0 } else { 0.5 };
+                least_turn = largest;
+            }
+            let share = relaxation * (LARGEST_TURN / largest).min(1.0);
             let mut rise = zero;
             for quad in &mut self.quads {
                 let [turn, _, z] = quad.mean_of_centre(simd);

@@ -1,0 +1,64 @@
+//! The data sets in `examples/`, each of which shows a kind of input, as a user diagnoses them.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::sfers;
+use serde_json::Value;
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
+}
+
+/// The diagnosis of an example.
+fn diagnosed(name: &str) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let output = sfers(folder.path(), &["diagnose", example(name).to_str().unwrap(), "--out", "d", "--quiet", "--json"]);
+    assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    // The extended model is an experiment.
+    let run = sfers(&folder.path().join("d"), &["run", "extended.toml", "--quiet"]);
+    assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The named causes, without the discretisation.
+fn ids(diagnosis: &Value) -> Vec<&str> {
+    let effects = diagnosis["effects"].as_array().unwrap().iter().filter(|effect| effect["role"] == "cause");
+    effects.map(|effect| effect["id"].as_str().unwrap()).filter(|id| *id != "discretisation").collect()
+}
+
+/// Value and interval of the first parameter of a named cause.
+fn parameter(diagnosis: &Value, id: &str) -> [f64; 3] {
+    let effect = diagnosis["effects"].as_array().unwrap().iter().find(|effect| effect["id"] == id).unwrap();
+    let parameter = &effect["parameters"][0];
+    [&parameter["value"], &parameter["ci95"][0], &parameter["ci95"][1]].map(|x| x.as_f64().unwrap())
+}
+
+#[test]
+fn sheets_let_go_from_under_a_weight_and_from_level_show_their_stiffness() {
+    let d = diagnosed("released");
+    assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("named"), vec!["stiffness"]), "{}", d["summary"]);
+    let [value, low, high] = parameter(&d, "stiffness");
+    assert!((value - 0.9).abs() < 0.01 && low <= 0.9 && 0.9 <= high, "{value} {low} {high}");
+}
+
+#[test]
+#[ignore = "slow: run by scripts/test.sh"]
+fn a_voltage_of_its_own_file_is_brought_to_the_clock_of_the_camera() {
+    let d = diagnosed("two_clocks");
+    assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("named"), vec!["tip-mass"]), "{}", d["summary"]);
+    // The offsets of examples/measured_data.py.
+    let clock = d["bench"].as_array().unwrap().iter().find(|fault| fault["id"] == "clock offset").unwrap();
+    let found: Vec<f64> = clock["runs"].as_array().unwrap().iter().map(|run| run["value"].as_f64().unwrap()).collect();
+    assert!(found.iter().zip([-4.6, 4.1, -2.8, 3.5]).all(|(found, ms)| (found - ms).abs() < 0.2), "{found:?}");
+    let remarks: Vec<&str> = d["data_quality"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    assert!(remarks.iter().any(|remark| remark.contains("rows without a known voltage are left out")), "{remarks:?}");
+}
+
+#[test]
+#[ignore = "slow: run by scripts/test.sh"]
+fn the_height_of_one_point_is_enough() {
+    let d = diagnosed("one_point");
+    assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("named"), vec!["tip-mass"]), "{}", d["summary"]);
+}
