@@ -27,7 +27,7 @@ NOISE_MM = 0.05
 class Mode:
     """A mode of the clamped beam with rigidity EI x stiffness, scaled so that its mean square is 1."""
 
-    def __init__(self, number, stiffness=1.0):
+    def __init__(self, number, stiffness=1.0, damping=1.0):
         low, high = (number - 0.9) * math.pi, number * math.pi
         for _ in range(200):
             middle = 0.5 * (low + high)
@@ -36,7 +36,7 @@ class Mode:
         b = 0.5 * (low + high)
         sigma = (math.cosh(b) + math.cos(b)) / (math.sinh(b) + math.sin(b))
         self.rate = b * b * math.sqrt(EI * stiffness / MASS) / LENGTH**2
-        self.zeta = 0.5 * DAMPING_TIME * self.rate
+        self.zeta = 0.5 * damping * DAMPING_TIME * self.rate
         apart = cmath.sqrt(self.zeta**2 - 1)
         self.roots = [(-self.zeta + apart) * self.rate, (-self.zeta - apart) * self.rate]
         self.tip = math.cosh(b) - math.cos(b) - sigma * (math.sinh(b) - math.sin(b))
@@ -58,7 +58,20 @@ class Mode:
         return 1 / (1 - ratio**2 + 2j * self.zeta * ratio)
 
 
-def sag(stiffness):
+    def driven(self, frequency, time, exposure):
+        """Coordinate over the static one of 1 V under (1 - cos)/2 V from rest on, as the mean over an exposure about a time."""
+        a, b = self.roots
+        drive = 2j * math.pi * frequency
+        h = self.response(frequency)
+        # What is at rest at 0: 1 - Re(h) + x + y = 0 and -Re(drive h) + a x + b y = 0.
+        rest, speed = h.real - 1, (drive * h).real
+        x = (speed - b * rest) / (a - b)
+        y = rest - x
+        mean = lambda root: cmath.exp(root * time) * cmath.sinh(0.5 * root * exposure) / (0.5 * root * exposure)
+        return 0.5 * (1 - (h * mean(drive)).real + (x * mean(a) + y * mean(b)).real)
+
+
+def sag(stiffness=1.0):
     """Deflection of the tip by the weight (mm)."""
     return -10 * MASS * GRAVITY * LENGTH**4 / (8 * EI * stiffness)
 
@@ -109,7 +122,53 @@ def released():
         write(HERE / f"released/{name}.csv", ["t_s", "tip_z_mm"], rows)
 
 
+def exposure():
+    """Sines filmed at 60 frames a second with an exposure of 12 ms; nothing is hidden. The voltage is logged at 250 Hz."""
+    noise = random.Random(2)
+    modes = [Mode(i + 1) for i in range(6)]
+    for frequency in [3, 8, 13, 17]:
+        volt = lambda t: 20 * (1 - math.cos(2 * math.pi * frequency * t))
+        rows = [[f"{k / 250:.3f}", f"{volt(k / 250):.3f}"] for k in range(271)]
+        write(HERE / f"exposure/{frequency}hz-volts.csv", ["t_s", "v1_v"], rows)
+        rows = []
+        for frame in range(1, 61):
+            z = sag() + 10 * sum(40 * m.of_volt * m.tip * m.driven(frequency, frame / 60, 0.012) for m in modes)
+            rows.append([frame, f"{z + noise.gauss(0, 0.04):.3f}"])
+        write(HERE / f"exposure/{frequency}hz-camera.csv", ["frame", "tip_z_mm"], rows)
+
+
+def frequency_response():
+    """Frequency responses of a sheet of 1.5 times the damping."""
+    noise = random.Random(3)
+    modes = [Mode(i + 1, damping=1.5) for i in range(6)]
+    for volts in [10, 20, 30]:
+        rows = []
+        for k in range(26):
+            f = 2 * 1.12**k
+            z = 10 * sum(volts * m.of_volt * m.tip * m.response(f) for m in modes)
+            z += complex(noise.gauss(0, 0.01), noise.gauss(0, 0.01))
+            rows.append([f"{f:.3f}", f"{abs(z):.5f}", f"{math.degrees(cmath.phase(z)):.3f}"])
+        write(HERE / f"frequency_response/{volts}v.csv", ["f_hz", "amplitude_mm", "phase_deg"], rows)
+
+
+def slow_loops():
+    """Voltages and heights without time. Each of eight plays (backlash) follows the voltage within its width."""
+    noise = random.Random(4)
+    for most in [1000, 600, 300]:
+        plays, rows = [0.0] * 8, []
+        for v in [*range(0, most, 20), *range(most, -1, -20)]:
+            # Widths up to 400 V; six tenths of the motion are without play.
+            plays = [min(max(p, v - 50 * (i + 1)), v + 50 * (i + 1)) for i, p in enumerate(plays)]
+            bend = CURVATURE * (0.6 * v + 0.4 * sum(plays) / len(plays))
+            height = (1 - math.cos(bend * LENGTH)) / bend if bend else 0.0
+            rows.append([v, f"{sag() + 10 * height + noise.gauss(0, NOISE_MM):.3f}"])
+        write(HERE / f"slow_loops/{most}v.csv", ["v1_v", "tip_z_mm"], rows)
+
+
 if __name__ == "__main__":
     two_clocks()
     one_point()
     released()
+    exposure()
+    frequency_response()
+    slow_loops()

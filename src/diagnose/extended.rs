@@ -31,7 +31,9 @@ impl Files {
     pub fn new(dataset: &Dataset, plant: &RobotPlant, outcome: &Outcome) -> Self {
         let chi2 = |run: &usize| sum_of_squares(&outcome.calibrated.residuals[*run]);
         let all = outcome.split.all();
-        let run = all.iter().copied().max_by(|a, b| chi2(a).total_cmp(&chi2(b))).unwrap_or(0);
+        // A run in time, if there is one.
+        let of_time = |run: &usize| dataset.runs[*run].times.len() > 1;
+        let run = all.iter().copied().max_by(|a, b| of_time(a).cmp(&of_time(b)).then(chi2(a).total_cmp(&chi2(b)))).unwrap_or(0);
         let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run].shares);
         Self { experiment, drive, residuals: residuals(plant, outcome) }
     }

@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
-use super::dataset::{Bench, Dataset, Start};
+use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
+use super::response::Sine;
 use super::track::{ON_STEP, track};
 use super::voltage::Command;
 use crate::analytic;
@@ -25,6 +26,11 @@ const STEPS_PER_PERIOD: f64 = 220.0;
 const GROUND_STEP: f64 = 1e-4;
 /// Kinds of effects that do nothing at 0 V.
 const ON_VOLTAGES: [Kind; 2] = [Kind::Driver, Kind::Actuation];
+/// Time steps in a period of a frequency response.
+const ROWS_PER_PERIOD: f64 = 40.0;
+/// Nodes and weights of Gauss's rule for the mean over an interval of length 1 about 0: exact for a motion of fifth degree in time.
+const OF_EXPOSURE: [[f64; 2]; 3] =
+    [[-0.387_298_334_620_741_7, 5.0 / 18.0], [0.0, 8.0 / 18.0], [0.387_298_334_620_741_7, 5.0 / 18.0]];
 /// Largest change of a run's prediction by a longer time step (rms, in σ).
 const LARGEST_CHANGE: f64 = 0.15;
 
@@ -57,6 +63,12 @@ struct Run {
     duration: f64,
     /// Time step (s).
     step: f64,
+    /// Factor on positive voltages (–).
+    positive_gain: f64,
+    /// False where times were made of voltages: rows then have no clock that could be off.
+    has_clock: bool,
+    /// The frequency response that it is, if it is none in time.
+    response: Option<Response>,
 }
 
 /// A data set with its robot.
@@ -69,6 +81,8 @@ pub struct RobotPlant {
     signals: Vec<Signal>,
     candidates: Vec<Candidate>,
     bench: Bench,
+    /// Time over which a frame takes the mean of the motion (s).
+    exposure: f64,
     /// True if there is no voltage in any run.
     without_voltage: bool,
 }
@@ -78,6 +92,7 @@ impl RobotPlant {
     pub fn new(dataset: &Dataset, checked: &quality::Checked) -> Self {
         let n = dataset.robot.actuators;
         let (mut runs, mut signals) = (Vec::new(), Vec::new());
+        let responses = dataset.response_channels();
         for (run, masks) in dataset.runs.iter().zip(&checked.runs) {
             let robot = run.robot.clone();
             let gain = run.nominal.robot.positive_gain.unwrap_or(1.0);
@@ -97,39 +112,63 @@ impl RobotPlant {
             for (channel, (column, usable)) in run.channels.iter().zip(masks).enumerate() {
                 for (row, value) in column.iter().enumerate().filter(|(row, _)| usable[*row]) {
                     signal.values.push(*value);
-                    signal.sigmas.push(checked.noise[channel]);
+                    signal.sigmas.push(run.sigma.unwrap_or(checked.noise[channel]));
                     signal.times.push(times[row]);
                     signal.channels.push(channel);
                     signal.inputs.push(run.voltages[row * n]);
                 }
             }
+            let mut longest = step(&robot, &times);
+            if let Some(Response { frequencies, channel, amplitude, parts, .. }) = &run.response {
+                // In-phase and quadrature parts are channels of their own, with frequencies for times.
+                let first = 2 * dataset.markers.len() + 2 * responses.iter().take_while(|other| *other < channel).count();
+                for (part, (frequency, values)) in
+                    [0, 1].into_iter().flat_map(|k| frequencies.iter().zip(parts).map(move |row| (k, row)))
+                {
+                    signal.values.push(values[part]);
+                    signal.sigmas.push(run.sigma.unwrap_or(checked.noise[*channel]));
+                    signal.times.push(*frequency);
+                    signal.channels.push(first + part);
+                    signal.inputs.push(*amplitude);
+                }
+                longest = longest.min(1.0 / (ROWS_PER_PERIOD * frequencies[frequencies.len() - 1]));
+            }
             signals.push(signal);
             runs.push(Run {
-                step: step(&robot, &times),
+                step: longest,
                 robot,
                 markers: run.positions.clone(),
                 command,
                 start: run.start,
                 origin: run.origin,
                 duration: times[times.len() - 1],
+                positive_gain: gain,
+                has_clock: run.has_clock,
+                response: run.response.clone(),
             });
         }
         let mut candidates = candidates(&dataset.robot, dataset.markers.len());
-        let without_voltage = dataset.runs.iter().all(|run| run.command().1.iter().all(|v| *v == 0.0));
+        let is_at_zero = |run: &MeasuredRun| run.response.is_none() && run.command().1.iter().all(|v| *v == 0.0);
+        let without_voltage = dataset.runs.iter().all(is_at_zero);
         if without_voltage {
             // What acts on voltages does nothing without any.
             candidates.retain(|c| {
                 effects::find(c.id).is_none_or(|effect| !ON_VOLTAGES.contains(&effect.kind)) && c.id != "actuation-gain"
             });
         }
+        let mut channels = dataset.channel_names();
+        for channel in responses {
+            channels.extend(["in phase", "in quadrature"].map(|part| format!("{} {part}", channels[channel])));
+        }
         let plant = Self {
             robot: dataset.robot.clone(),
             markers: dataset.markers.iter().map(|marker| marker.position).collect(),
-            channels: dataset.channel_names(),
+            channels,
             runs,
             signals,
             candidates,
             bench: dataset.bench,
+            exposure: 1e-3 * dataset.camera.exposure_ms.unwrap_or(0.0),
             without_voltage,
         };
         plant.with_chosen_steps()
@@ -272,7 +311,7 @@ impl Plant for RobotPlant {
     }
 
     fn moves_unaided(&self, run: usize) -> bool {
-        self.runs[run].start != Start::Settled
+        self.runs[run].start != Start::Settled || self.runs[run].response.is_some()
     }
 
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
@@ -337,7 +376,10 @@ impl RobotPlant {
         nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let Run { robot, markers, command, start, .. } = &self.runs[run];
+        let Run { robot, markers, command, start, response, has_clock, .. } = &self.runs[run];
+        if let Some(response) = response {
+            return self.respond(response, &self.runs[run], terms, resolution, nuisance, step);
+        }
         let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
         let Setup { robot, drive, chain, view } =
             self.setup(robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
@@ -346,14 +388,54 @@ impl RobotPlant {
         let mut times = signal.times.clone();
         times.sort_by(f64::total_cmp);
         times.dedup();
-        let seen: Vec<f64> = times.iter().map(|t| (nuisance.time(*t) - view.delay).max(0.0)).collect();
-        let tracks = track(&robot, start, &drive, chain, step, markers, &seen)?;
+        let rule: &[[f64; 2]] = if self.exposure > 0.0 { &OF_EXPOSURE } else { &[[0.0, 1.0]] };
+        // Times at which positions are needed, with their rows and weights.
+        let at_row = |(row, t): (usize, &f64)| {
+            let middle = if *has_clock { nuisance.time(*t) } else { *t } - view.delay;
+            rule.iter().map(move |[node, weight]| ((middle + node * self.exposure).max(0.0), row, *weight))
+        };
+        let mut seen: Vec<(f64, usize, f64)> = times.iter().enumerate().flat_map(at_row).collect();
+        // Frames may overlap where rows are closer than an exposure.
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let tracks = track(&robot, start, &drive, chain, step, markers, &seen.iter().map(|(t, ..)| *t).collect::<Vec<_>>())?;
         let n = markers.len();
+        let mut positions = vec![[0.0; 2]; times.len() * n];
+        for ((_, row, weight), at) in seen.iter().zip(tracks.chunks_exact(n)) {
+            for (mean, [x, z]) in positions[row * n..].iter_mut().zip(at) {
+                *mean = [mean[0] + weight * x, mean[1] + weight * z];
+            }
+        }
         let at = |(t, channel): (&f64, &usize)| {
             let row = times.partition_point(|time| time < t);
-            let seen = view.of(tracks[row * n + channel / 2]);
+            let seen = view.of(positions[row * n + channel / 2]);
             10.0 * seen[channel % 2]
         };
         Ok(signal.times.iter().zip(&signal.channels).map(at).collect())
+    }
+
+    /// The values of a frequency response. An analyser has one clock and one gain, so only the gain of the inputs differs from run to run.
+    fn respond(
+        &self,
+        response: &Response,
+        run: &Run,
+        terms: &[Term],
+        resolution: f64,
+        nuisance: &Nuisance,
+        step: f64,
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        let first = analytic::cantilever_frequency(&run.robot) / (run.robot.actuators as f64).powi(2);
+        let marker = &run.markers[response.channel / 2..][..1];
+        let of = |frequency: &f64| -> Result<[f64; 2], DiagnoseError> {
+            let applied = |v: f64| (1.0 + nuisance.base[Spread::GAIN]) * if v > 0.0 { run.positive_gain * v } else { v };
+            let sine = Sine::new(response, *frequency, &run.robot, first, applied);
+            let duration = sine.duration();
+            let Setup { robot, drive, chain, view } =
+                self.setup(run.robot.clone(), terms, resolution, sine.table.clone(), duration)?;
+            let tracks = track(&robot, &run.start, &drive, chain, step, marker, &sine.times(-view.delay))?;
+            let samples: Vec<f64> = tracks.into_iter().map(|at| 10.0 * view.of(at)[response.channel % 2]).collect();
+            Ok(sine.parts(&samples, self.exposure))
+        };
+        let parts: Vec<[f64; 2]> = response.frequencies.iter().map(of).collect::<Result<_, _>>()?;
+        Ok([0, 1].into_iter().flat_map(|part| parts.iter().map(move |parts| parts[part])).collect())
     }
 }

@@ -51,6 +51,10 @@ pub(super) struct Wanted<'a> {
     /// The file's names and units of columns where they are not those of this program.
     pub columns: &'a BTreeMap<String, Column>,
     pub voltages: Voltages,
+    /// Rate (V/s) at which the voltages of a file without times change.
+    pub ramp: Option<f64>,
+    /// Frames per second, for a column `frame` in place of `t_s`.
+    pub frame_rate: Option<f64>,
 }
 
 /// Reads a file.
@@ -81,7 +85,8 @@ pub(super) fn check_columns(
     markers: &[Marker],
 ) -> Result<(), (String, String)> {
     let voltages = (1..=robot.actuators).map(|n| format!("v{n}_v"));
-    let known: Vec<String> = std::iter::once("t_s".to_owned()).chain(voltages).chain(marker_columns(markers)).collect();
+    let known: Vec<String> =
+        ["t_s".to_owned(), "frame".to_owned()].into_iter().chain(voltages).chain(marker_columns(markers)).collect();
     let mut taken: Vec<&str> = Vec::new();
     for (key, Column { from, factor, offset }) in columns {
         let wrong = |reason: String| Err((key.clone(), reason));
@@ -133,7 +138,17 @@ fn parse(bytes: &[u8], wanted: &Wanted) -> Result<Rows, Wrong> {
             key.as_str()
         });
         let voltage = header.strip_prefix('v').and_then(|rest| rest.strip_suffix("_v")).and_then(|n| n.parse::<usize>().ok());
-        let slot = if header == "t_s" {
+        let slot = if header == "t_s" || header == "frame" {
+            if wanted.ramp.is_some() {
+                let reason =
+                    format!("{written} stands beside rate_v_per_s, which makes times of voltages: take one of the two away");
+                return Err(wrong(1, at + 1, reason));
+            }
+            if header == "frame" {
+                let missing = "frame numbers are no times without frame_rate_hz in [camera]";
+                let rate = wanted.frame_rate.ok_or_else(|| wrong(1, at + 1, missing.into()))?;
+                units[at] = (units[at].0 / rate, units[at].1 / rate);
+            }
             &mut time_column
         } else if let Some(n) = voltage {
             if wanted.voltages == Voltages::Elsewhere {
@@ -162,7 +177,13 @@ fn parse(bytes: &[u8], wanted: &Wanted) -> Result<Rows, Wrong> {
     }
     let called =
         |key: &str| wanted.columns.get(key).map_or_else(String::new, |column| format!(", {:?} in [columns],", column.from));
-    let time_column = time_column.ok_or_else(|| wrong(1, 0, format!("the column t_s{} is missing", called("t_s"))))?;
+    if time_column.is_none() && wanted.ramp.is_none() {
+        let remedy = match (wanted.voltages, markers.is_empty()) {
+            (Voltages::Needed, false) => "; of a slow loop without times, give rate_v_per_s",
+            _ => "",
+        };
+        return Err(wrong(1, 0, format!("the column t_s{} is missing{remedy}", called("t_s"))));
+    }
     let has_voltages = volt_columns.iter().any(Option::is_some) || wanted.voltages == Voltages::Needed;
     let need_voltage = |(i, column): (usize, Option<usize>)| {
         column.ok_or_else(|| {
@@ -205,30 +226,43 @@ fn parse(bytes: &[u8], wanted: &Wanted) -> Result<Rows, Wrong> {
             let name = headers.get(column).unwrap_or_default();
             Err(wrong(line, column + 1, format!("{name} is {}, beyond {most:.0} {unit}; is it in {unit}?", words::number(value))))
         };
-        let time = within(time_column, MOST_SECONDS, "s")?;
-        if times.last().is_some_and(|last| time - last < LEAST_SECONDS) {
-            let last = times[times.len() - 1];
-            return Err(wrong(
-                line,
-                time_column + 1,
-                format!(
-                    "t_s is {} after {}; times must rise, by {LEAST_SECONDS:e} s at least",
-                    words::number(time),
-                    words::number(last)
-                ),
-            ));
-        }
-        times.push(time);
+        let mut now = Vec::with_capacity(actuators);
         for &column in &volt_columns {
             let voltage = within(column, MOST_VOLTS, "V")?;
             robot
                 .check_voltage(voltage, wanted.positive_gain)
                 .map_err(|reason| wrong(line, column + 1, format!("{} {reason}", headers.get(column).unwrap_or_default())))?;
-            voltages.push(voltage);
+            now.push(voltage);
         }
         if !has_voltages && wanted.voltages == Voltages::NoneIsZero {
-            voltages.extend(std::iter::repeat_n(0.0, actuators));
+            now.resize(actuators, 0.0);
         }
+        let time = match (time_column, wanted.ramp, times.last()) {
+            (Some(column), ..) => within(column, MOST_SECONDS, "s")?,
+            (None, Some(rate), Some(last)) => {
+                let before = &voltages[voltages.len() - actuators..];
+                let change = now.iter().zip(before).map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max);
+                if change / rate < LEAST_SECONDS {
+                    let reason = "the voltage is that of the row before, so that rate_v_per_s gives it no time: keep one of the two rows, or give t_s";
+                    return Err(wrong(line, 0, reason.into()));
+                }
+                last + change / rate
+            }
+            _ => 0.0,
+        };
+        if let Some(last) = times.last().filter(|last| time - **last < LEAST_SECONDS) {
+            return Err(wrong(
+                line,
+                time_column.map_or(0, |column| column + 1),
+                format!(
+                    "t_s is {} after {}; times must rise, by {LEAST_SECONDS:e} s at least",
+                    words::number(time),
+                    words::number(*last)
+                ),
+            ));
+        }
+        times.push(time);
+        voltages.extend(now);
         for (channel, column) in channels.iter_mut().zip(&columns) {
             if let Some(column) = *column {
                 let empty = record.get(column).unwrap_or_default().is_empty();
@@ -269,7 +303,18 @@ mod tests {
         let columns = columns
             .iter()
             .map(|(key, from, factor)| ((*key).into(), Column { from: (*from).into(), factor: *factor, offset: 0.5 }));
-        parse(bytes, &Wanted { robot: &robot, positive_gain: 1.0, markers: &markers, columns: &columns.collect(), voltages })
+        parse(
+            bytes,
+            &Wanted {
+                robot: &robot,
+                positive_gain: 1.0,
+                markers: &markers,
+                columns: &columns.collect(),
+                voltages,
+                ramp: None,
+                frame_rate: Some(50.0),
+            },
+        )
     }
 
     #[test]

@@ -250,8 +250,8 @@ mod tests {
             assert!((settled[0] - settled[1]).abs() < 1e-8, "{settled:?}");
             assert_eq!(heights(&robot, Start::Level, position, &[0.0]), [0.0]);
             for start in [Start::Level, Start::Held { position, z }, Start::Hung(2.0)] {
-                let seen = heights(&robot, start, position, &[0.0, 0.02, 20.0]);
-                assert!((seen[0] - seen[1]).abs() > 1e-3 && (seen[2] - settled[0]).abs() < 1e-4, "{start:?}: {seen:?}");
+                let seen = heights(&robot, start, position, &[0.0, 0.02, 40.0]);
+                assert!((seen[0] - seen[1]).abs() > 1e-3 && (seen[2] - settled[0]).abs() < 1e-3, "{start:?}: {seen:?}");
             }
             let held = heights(&robot, Start::Held { position, z }, position, &[0.0])[0];
             assert!((held - z).abs() < 1e-7, "{held}");

@@ -2,7 +2,7 @@
 
 use super::Default::{Else, Is, Needed};
 use super::Range::{Any, Between, Inside, Positive};
-use super::Value::{Name, Number, Other, Path, Text, Word};
+use super::Value::{Name, Number, Numbers, Other, Path, Text, Word};
 use super::{File, Key, Section, experiment, key};
 use crate::recording::definitions;
 
@@ -17,10 +17,13 @@ pub(super) static FILE: File = File {
         MARKERS,
         NOISE,
         BENCH,
+        CAMERA,
         COLUMNS,
         EFFECT,
         RUN,
         RELEASE,
+        FREQUENCY_RESPONSE,
+        STEADY,
         OBSERVATION,
     ],
 };
@@ -59,6 +62,26 @@ pub(super) const BENCH: Section = Section {
         key("zero_mm", Number(Between(0.0, 1e3)), Else("estimated"), "zero of every coordinate"),
         key("gain", Number(Between(0.0, 1.0)), Else("estimated"), "gain of the motion, as a share"),
         key("drift_mm_per_s", Number(Between(0.0, 1e3)), Else("estimated"), "drift of every coordinate"),
+    ],
+};
+
+pub(super) const CAMERA: Section = Section {
+    name: "camera",
+    heading: "[camera]",
+    about: "How frames become rows.",
+    keys: &[
+        key(
+            "frame_rate_hz",
+            Number(Between(0.0, 1e6)),
+            Else("unknown"),
+            "frames per second; a run's file may then have the column frame in place of t_s, with frame 0 at 0 s",
+        ),
+        key(
+            "exposure_ms",
+            Number(Between(0.0, 1e3)),
+            Else("none"),
+            "predictions are means over the exposure, in the middle of which t_s lies; at most the time between two frames",
+        ),
     ],
 };
 
@@ -120,6 +143,13 @@ pub(super) const RUN: Section = Section {
              camera outside of it are left out",
         ),
         key(
+            "rate_v_per_s",
+            Number(Positive),
+            Else("needs t_s"),
+            "for a slow loop of voltages and positions without t_s: the rate at which the voltage went from row to row; of several actuators, that of the \
+             largest change",
+        ),
+        key(
             "role",
             Word(&["auto", "fit", "held-out"]),
             Is("\"auto\""),
@@ -147,6 +177,39 @@ pub(super) const RUN: Section = Section {
         ),
         key("markers", Other("a table"), Else("as above"), "replacements of positions of [markers]"),
         key("effect", Other("a list of tables"), Else("none"), "more [[effect]] tables, of this run only"),
+    ],
+};
+
+pub(super) const FREQUENCY_RESPONSE: Section = Section {
+    name: "frequency_response",
+    heading: "[[frequency_response]]",
+    about: "Amplitude and phase of one coordinate of a clamped robot under sines that all actuators share, when the vibration is steady. It counts as a run \
+            of two channels, the parts in phase and in quadrature.",
+    keys: &[
+        key("id", Text, Needed, "unique name"),
+        key(
+            "file",
+            Path,
+            Needed,
+            "its CSV: f_hz, rising; amplitude_mm, half of peak to peak; phase_deg or phase_rad, by which the coordinate leads the voltage: negative for a lag",
+        ),
+        key("coordinate", Text, Needed, "NAME_x or NAME_z of a marker"),
+        key("amplitude_v", Number(Positive), Needed, "half of the peak-to-peak voltage"),
+        key("offset_v", Number(Any), Is("0.0"), "mean voltage"),
+        key("sigma_mm", Number(Positive), Needed, "one standard deviation of each part"),
+        key("role", Word(&["auto", "fit", "held-out"]), Is("\"auto\""), "as of a run"),
+    ],
+};
+
+pub(super) const STEADY: Section = Section {
+    name: "steady",
+    heading: "[[steady]]",
+    about: "Markers of a clamped robot at rest under constant voltages: besides the keys below NAME_x_mm or NAME_z_mm = position, one at least. Each counts as \
+            a run.",
+    keys: &[
+        key("voltages_v", Numbers, Needed, "one per actuator"),
+        key("sigma_mm", Number(Positive), Else("[noise]"), "one standard deviation"),
+        key("role", Word(&["auto", "fit", "held-out"]), Is("\"auto\""), "as of a run"),
     ],
 };
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::super::observations;
 use super::super::observations::ObservationError;
 use super::super::run_csv;
-use super::{Column, DataError, Dataset, Description, Marker, MeasuredRun};
+use super::{Camera, Column, DataError, Dataset, Description, Marker, MeasuredRun};
 use crate::effects::{self, Kind};
 use crate::experiment::{self, Config, ConfigError, DriveConfig, EffectConfig, SimulationConfig, Source, StepConfig, presets};
 use crate::model::Robot;
@@ -36,7 +36,9 @@ impl Dataset {
         })?;
         let wrong =
             |key: &[&str], reason: String| DataError::Content { path: path.into(), line: line_of(&text, key), column: 0, reason };
-        if let (false, [_, ..]) = (description.run.is_empty(), &description.observation[..]) {
+        let has_runs =
+            !(description.run.is_empty() && description.frequency_response.is_empty() && description.steady.is_empty());
+        if let (true, [_, ..]) = (has_runs, &description.observation[..]) {
             return Err(value_error(
                 path,
                 &text,
@@ -62,10 +64,10 @@ impl Dataset {
             .map_err(|(index, reason)| value_error(path, &text, &["effect", &index.to_string()], "effect", reason))?;
         let robot = resolved_robot(path, &text, &nominal, &[])?;
         let length = robot.material.actuator_length * robot.actuators as f64;
-        if description.run.is_empty() && description.observation.is_empty() {
+        if !has_runs && description.observation.is_empty() {
             return Err(wrong(&["dataset"], "there are no runs: add [[run]] tables with id and file".into()));
         }
-        if description.markers.is_empty() && !description.run.is_empty() {
+        if description.markers.is_empty() && has_runs {
             return Err(wrong(&["markers"], "there are no markers: add [markers] with name = distance in mm".into()));
         }
         let mut markers = Vec::new();
@@ -110,7 +112,17 @@ impl Dataset {
         let columns = &description.columns;
         run_csv::check_columns(columns, &robot, &markers)
             .map_err(|(key, reason)| value_error(path, &text, &["columns", &key], &format!("columns.{key}"), reason))?;
-        let reader = Reader { path, text: &text, nominal: &nominal, robot: &robot, markers: &markers, columns };
+        let camera = description.camera;
+        let per_frame = camera.frame_rate_hz.map_or(1e3, |rate| 1e3 / rate);
+        for (key, value, most) in [("frame_rate_hz", camera.frame_rate_hz, 1e6), ("exposure_ms", camera.exposure_ms, per_frame)] {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && *value <= most * (1.0 + 1e-9))) {
+                let reason = format!("is {}, but must be above 0 and at most {}", words::number(value), words::number(most));
+                let why =
+                    if key == "exposure_ms" && camera.frame_rate_hz.is_some() { ", the time between two frames" } else { "" };
+                return Err(value_error(path, &text, &["camera", key], &format!("camera.{key}"), reason + why));
+            }
+        }
+        let reader = Reader { path, text: &text, nominal: &nominal, robot: &robot, markers: &markers, columns, camera };
         let mut runs: Vec<MeasuredRun> = Vec::new();
         for (index, entry) in description.run.iter().enumerate() {
             let number = index.to_string();
@@ -121,6 +133,16 @@ impl Dataset {
                 return Err(wrong(&["run", &number, "id"], format!("id: two runs are called {:?}", entry.id)));
             }
             runs.push(reader.run(index, entry)?);
+        }
+        for (index, entry) in description.frequency_response.iter().enumerate() {
+            if runs.iter().any(|run| run.id == entry.id) {
+                let parts = ["frequency_response", &index.to_string(), "id"];
+                return Err(wrong(&parts, format!("id: two runs are called {:?}", entry.id)));
+            }
+            runs.push(reader.response(index, entry)?);
+        }
+        for (index, entry) in description.steady.iter().enumerate() {
+            runs.push(reader.steady(index, entry)?);
         }
         let mut observations = description.observation;
         for (index, observation) in observations.iter_mut().enumerate() {
@@ -149,6 +171,7 @@ impl Dataset {
             markers,
             noise,
             bench: description.bench,
+            camera,
             runs,
             observations,
         })
@@ -163,6 +186,7 @@ pub(super) struct Reader<'a> {
     pub robot: &'a Robot,
     pub markers: &'a [Marker],
     pub columns: &'a BTreeMap<String, Column>,
+    pub camera: Camera,
 }
 
 /// What is wrong with a marker at `position` (mm) of a robot of `length` (cm).

@@ -59,13 +59,30 @@ impl Reader<'_> {
             (None, Start::Settled) => Voltages::Needed,
             (None, _) => Voltages::NoneIsZero,
         };
-        let wanted = Wanted { robot: &robot, positive_gain: gain, markers: self.markers, columns: self.columns, voltages };
+        if let Some(rate) = entry.rate_v_per_s {
+            if !(rate > 0.0 && rate.is_finite()) {
+                return Err(self.wrong(index, entry, &["rate_v_per_s"], format!("is {}, but must be positive", number(rate))));
+            }
+            if entry.voltage_file.is_some() || start != Start::Settled {
+                let reason = "belongs to a file of voltages and positions without time, which starts at rest: take voltage_file and start away";
+                return Err(self.wrong(index, entry, &["rate_v_per_s"], reason));
+            }
+        }
+        let wanted = Wanted {
+            robot: &robot,
+            positive_gain: gain,
+            markers: self.markers,
+            columns: self.columns,
+            voltages,
+            ramp: entry.rate_v_per_s,
+            frame_rate: self.camera.frame_rate_hz,
+        };
         let mut rows = run_csv::read(&path, &wanted)?;
         let mut log = None;
         if let Some(file) = &entry.voltage_file {
             let file = folder.join(file);
             let Rows { times, voltages, .. } =
-                run_csv::read(&file, &Wanted { markers: &[], voltages: Voltages::Needed, ..wanted })?;
+                run_csv::read(&file, &Wanted { markers: &[], voltages: Voltages::Needed, frame_rate: None, ..wanted })?;
             let ends = [times[0], times[times.len() - 1]];
             let seen = [rows.times[0], rows.times[rows.times.len() - 1]];
             let left_out = keep(&mut rows, robot.actuators, ends);
@@ -114,9 +131,12 @@ impl Reader<'_> {
             log,
             origin,
             start,
+            has_clock: entry.rate_v_per_s.is_none(),
             nominal,
             robot,
             positions,
+            sigma: None,
+            response: None,
             channels,
             remarks,
         };
@@ -270,7 +290,7 @@ fn checked(mut run: MeasuredRun, entry: &RunEntry, command_path: &Path) -> Resul
         return Err(bad(command_path, entry, reason));
     }
     let rate = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
-    let is_driven = run.start == Start::Settled || voltages.iter().any(|v| *v != voltages[0]);
+    let is_driven = entry.rate_v_per_s.is_none() && (run.start == Start::Settled || voltages.iter().any(|v| *v != voltages[0]));
     let first = analytic::cantilever_frequency(robot) / (robot.actuators as f64).powi(2);
     if is_driven && robot.mount == Mount::Clamped && rate < 2.0 * first {
         run.remarks.push(format!(
