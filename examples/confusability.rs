@@ -90,9 +90,10 @@ fn chosen(argument: Option<&String>) -> Vec<String> {
 
 /// Adopted causes with those they are tied with.
 fn said(d: &Diagnosis) -> String {
-    let of = |effect: &&Adopted| match &effect.tied_with[..] {
-        [] => effect.id.clone(),
-        tied => format!("{} (= {})", effect.id, tied.join(", ")),
+    let of = |effect: &&Adopted| match (&effect.tied_with[..], &effect.nearest[..]) {
+        ([], [near, ..]) => format!("{} ({} leaves {:.1} %)", effect.id, near.id, 100.0 * near.left),
+        ([], []) => effect.id.clone(),
+        (tied, _) => format!("{} (= {})", effect.id, tied.join(", ")),
     };
     physics(d).iter().map(of).collect::<Vec<_>>().join(" + ")
 }
@@ -175,7 +176,7 @@ fn is_expected(d: &Diagnosis, effects: &[String]) -> bool {
     match cases::named(effects)[..] {
         [] => d.verdict == Verdict::None,
         [DRIFTING_GAIN] => d.verdict == Verdict::None && d.bench.iter().any(|fault| fault.id == "gain"),
-        [id] if OUTSIDE.contains(&id) => d.verdict == Verdict::Unexplained,
+        [id] if OUTSIDE.contains(&id) => matches!(d.verdict, Verdict::Unexplained | Verdict::Located),
         [id] => is_right(d, id),
         _ => d.verdict != Verdict::Unexplained && are_named(d, effects),
     }

@@ -133,7 +133,7 @@ pub fn highest_joint_frequency(robot: &Robot) -> f64 {
 /// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require a smaller step.
 ///
 /// The robot's extensions are included: factors on stiffness, damping and mass; point masses; a compliant clamp (implicit, so it adds `h²/c` at the
-/// base); dry friction of the joints with its slope at rest; viscous friction on the floor (an upper bound); material loss, by the spectral radius
+/// base); dry friction of the joints with its slope at rest; curves of their moment with their steepest slope; springs with a limit; viscous friction on the floor (an upper bound); material loss, by the spectral radius
 /// of a step at frequencies up to the highest. Hardening is left to [`stable_step_at`]. Air drag is neglected: its rate is below 1 % of 1/h at all
 /// speeds that Bullet allows.
 ///
@@ -147,8 +147,12 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     let (chain, joint, extensions) = (Chain::new(robot), robot.joint(), &robot.extensions);
     // The slope of k δ (1 − a (δ/ℓ)²).
     let hardening = 1.0 + 3.0 * (-extensions.softening).max(0.0) * curvature * curvature;
-    let stiffness = joint.stiffness * hardening;
-    let damping = joint.stiffness * joint.damping_time + extensions.dry_friction / DRY_FRICTION_RATE;
+    let link = robot.link_length();
+    let slips: f64 = extensions.slips.iter().map(|slip| slip.moment / slip.curvature).sum();
+    let stiffness = joint.stiffness * hardening + (extensions.moment_of_curvature.steepest() + slips) / link;
+    let damping = joint.stiffness * joint.damping_time
+        + extensions.dry_friction / DRY_FRICTION_RATE
+        + extensions.moment_of_rate.steepest() / link;
     let viscous = if robot.mount == Mount::Ground { extensions.stick_slip.viscous } else { 0.0 };
     let below = 0.5 * robot.collision_thickness;
     let mass: f64 = chain.bodies.iter().map(|body| body.mass).sum();
@@ -165,10 +169,10 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     // Limit of the last body alone: √(c² + 4ω²) − c without cancellation.
     let (omega2, c) = (stiffness / chain.last(), damping / chain.last());
     let step = largest(4.0 / ((c * c + 4.0 * omega2).sqrt() + c), holds);
-    if extensions.loss == 0.0 {
+    if !extensions.has_loss() {
         return step;
     }
-    let highest = highest_joint_frequency(robot).powi(2) * hardening;
+    let highest = highest_joint_frequency(robot).powi(2) * stiffness / joint.stiffness;
     let share = |n: u32| LOWEST_SHARE.powf(2.0 * f64::from(n) / f64::from(FREQUENCIES));
     largest(step.min(2.0 * LOSS_TIMES[0]), |h| {
         (0..=FREQUENCIES).all(|n| maxwell_chain_is_stable(highest * share(n), damping / stiffness, extensions.loss, h))
@@ -177,13 +181,13 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
 
 /// True if a mode with squared frequency `omega2` (1/s²) and damping time `damping` (s) does not grow at step `h` (s) with the generalised Maxwell
 /// chain, which the Bullet engine integrates explicitly.
-fn maxwell_chain_is_stable(omega2: f64, damping: f64, loss: f64, h: f64) -> bool {
+fn maxwell_chain_is_stable(omega2: f64, damping: f64, loss: [f64; LOSS_TIMES.len()], h: f64) -> bool {
     // States: rate times h, angle, q of each branch.
     let mut step = SMatrix::<f64, 7, 7>::identity();
     let kick = h * h * omega2;
     step[(0, 0)] -= h * damping * omega2;
     step[(0, 1)] = -kick;
-    (2..7).for_each(|level| step[(0, level)] = -kick * loss);
+    (2..7).for_each(|level| step[(0, level)] = -kick * loss[level - 2]);
     let rate = step.row(0).into_owned();
     let angle = step.row(1) + rate;
     step.set_row(1, &angle);
@@ -304,7 +308,7 @@ mod tests {
             robot.damping = Damping::Time(damping);
             robot.material.piezo_thickness *= thickness;
             let without = stable_step(&robot);
-            robot.extensions.loss = 0.1;
+            robot.extensions.loss = [0.1; LOSS_TIMES.len()];
             let step = stable_step(&robot);
             assert!(step > 0.0 && step <= without, "{damping}, {thickness}: {step} of {without}");
         }

@@ -12,6 +12,8 @@ pub enum Verdict {
     None,
     /// The causes are identified.
     Named,
+    /// It is known where something is missing, but no named law of that place suits: its curve is shown.
+    Located,
     /// Some causes cannot be told apart by these data.
     Tied,
     /// Structure is left that no cause in the library explains.
@@ -48,8 +50,10 @@ pub enum Part {
 pub struct Adopted {
     /// Its name.
     pub id: String,
-    /// Where it acts.
+    /// Kind of cause.
     pub kind: String,
+    /// The part of the equations in which it acts.
+    pub place: String,
     /// The cause in a sentence.
     pub cause: String,
     /// Its parameters.
@@ -60,11 +64,47 @@ pub struct Adopted {
     pub share: f64,
     /// What it counts for.
     pub role: Part,
+    /// Share of resamples over runs in which it is chosen (0 to 1); none where there are too few runs.
+    pub stability: Option<f64>,
+    /// The curve of a free form.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curve: Option<Curve>,
+    /// The named causes that were tried in the stead of the place's free form, nearest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub nearest: Vec<Nearest>,
     /// Share of the held-out χ² above the noise that it removes (0 to 1).
     pub gain_heldout: f64,
     /// Parameters that were given: name and value.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<(String, f64)>,
+}
+
+/// The curve of a free form, with its pointwise 95 % band.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Curve {
+    /// Name of the abscissa.
+    pub x_name: String,
+    /// Its unit; empty for dimensionless ones.
+    pub x_unit: String,
+    /// Name of the ordinate.
+    pub y_name: String,
+    /// Its unit; empty for dimensionless ones.
+    pub y_unit: String,
+    /// Abscissas.
+    pub x: Vec<f64>,
+    /// Ordinates.
+    pub y: Vec<f64>,
+    /// Lower and upper ends of the band.
+    pub ci95: Vec<[f64; 2]>,
+}
+
+/// A named cause that was tried in the stead of a free form.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nearest {
+    /// Its name.
+    pub id: String,
+    /// Share of what the free form takes on held-out runs that it leaves (0 to 1).
+    pub left: f64,
 }
 
 /// Error of a model on one run.
@@ -158,6 +198,8 @@ pub struct Diagnosis {
     pub dataset: String,
     /// The verdict.
     pub verdict: Verdict,
+    /// True if no structure is left and no more residual tests fail than chance explains.
+    pub complete: bool,
     /// The verdict in a sentence.
     pub summary: String,
     /// All adopted causes, discretisation and constants included.

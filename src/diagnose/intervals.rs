@@ -15,6 +15,8 @@ const CHI2_95: f64 = 3.841_458_820_694_124;
 pub(super) struct Intervals {
     /// Lower and upper end of each coordinate's 95 % interval.
     pub ends: Vec<[f64; 2]>,
+    /// Covariance of the coordinates, inflated.
+    pub covariance: DMatrix<f64>,
     /// Variance inflation of each coordinate, from [`Estimator::inflation`](super::fit::Estimator::inflation).
     pub inflation: Vec<f64>,
     /// Number of coordinates of each term.
@@ -50,7 +52,9 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
         let mut sides = [x, x];
         for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
             let mut half_width = CHI2_95.sqrt() * spread;
-            if n > 1 && half_width.is_finite() && half_width > 0.0 {
+            // The weights of a free form keep the linear interval.
+            let is_free_form = search.candidate(&model.terms[coordinates[k].0]).is_free_form;
+            if n > 1 && !is_free_form && half_width.is_finite() && half_width > 0.0 {
                 let to = (x + sign * half_width).clamp(free.bounds[0], free.bounds[1]);
                 if (to - x).abs() > 0.5 * half_width
                     && let Ok(chi2) =
@@ -79,7 +83,12 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
         }
     }
     let sizes = model.terms.iter().map(|term| term.x.len()).collect();
-    Ok(Intervals { ends, inflation, sizes, correlations, condition: condition(&scored.fit.information) })
+    let covariance = DMatrix::from_fn(n, n, |i, j| {
+        let of = |k: usize| numerics.get(k).map_or(0.0, |error| error / CHI2_95.sqrt());
+        let own = if i == j { of(i).powi(2) } else { 0.0 };
+        naive[(i, j)] * (inflation[i] * inflation[j]).sqrt() + own
+    });
+    Ok(Intervals { ends, covariance, inflation, sizes, correlations, condition: condition(&scored.fit.information) })
 }
 
 /// The model with coordinate `k` at `to` and all others at their linear estimates, within their bounds.

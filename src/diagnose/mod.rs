@@ -21,6 +21,7 @@ mod faults;
 pub mod fit;
 mod intervals;
 pub mod names;
+mod naming;
 pub mod noise;
 pub mod observations;
 #[cfg(feature = "view")]
@@ -41,6 +42,7 @@ mod run_csv;
 pub mod search;
 mod summary;
 mod track;
+mod visited;
 pub mod voltage;
 
 pub use error::DiagnoseError;

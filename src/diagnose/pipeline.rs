@@ -2,12 +2,13 @@
 
 use super::DiagnoseError;
 use super::dataset::Role;
-use super::diagnosis::{Adopted, Diagnosis, Estimate, Part, Ranked, RunError, Stage, Verdict};
+use super::diagnosis::{Adopted, Curve, Diagnosis, Estimate, Nearest, Part, Ranked, RunError, Stage, Verdict};
 use super::faults;
 use super::fit::{BLOCK, Estimator, Residuals, sum_of_squares};
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
-use super::plant::{Model, Plant, Signal, Term};
+use super::naming::{self, Naming};
+use super::plant::{FreeCurve, Model, Plant, Signal, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
 use super::summary::{failing, summary};
@@ -92,14 +93,15 @@ pub fn diagnose(
         calibrated = search.calibrated(start)?;
     }
     let insufficient = insufficient_data(plant, &search.split);
-    let Causes { best, trials, replaced, coarse_total, spikes: more } = find(&mut search, &calibrated, insufficient.is_some())?;
+    let Causes { best, trials, replaced, coarse_total, spikes: more, open, nearest } =
+        find(&mut search, &calibrated, insufficient.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
     }
 
     // The refined nominal model: its misfit is what the causes have to explain.
     let bare = search.fitted_at_its_spread(&Model { terms: Vec::new(), ..best.model().clone() })?;
-    let mut judged = judge(&search, best, &bare, nominal_resolution)?;
+    let mut judged = judge(&search, best, &bare, open, nominal_resolution)?;
     remarks.extend(judged.remark.take());
     // A cause whose interval contains its off value is not named.
     let (mut doubts, mut dropped) = (Vec::new(), None);
@@ -108,7 +110,7 @@ pub fn diagnose(
         dropped = Some(judged.best.model().clone());
         model.terms.remove(index);
         doubts.push(words);
-        judged = judge(&search, search.fitted(&model)?, &bare, nominal_resolution)?;
+        judged = judge(&search, search.fitted(&model)?, &bare, f64::INFINITY, nominal_resolution)?;
     }
     remarks.extend(doubts.iter().cloned());
     let Judged { best, coarse, refined, left, unexplained_fraction, is_unexplained, intervals, remark: _ } = judged;
@@ -123,6 +125,10 @@ pub fn diagnose(
     for (index, term) in best.model().terms.iter().enumerate() {
         effects.push(adopted(&search, &best, index, term, &intervals, &tied)?);
     }
+    for effect in &mut effects {
+        let tried = nearest.iter().find(|(id, _)| *id == effect.id);
+        effect.nearest = tried.map(|(_, tried)| tried.clone()).unwrap_or_default();
+    }
     set_roles(&mut effects, whole);
     let physics = effects.iter().filter(|effect| effect.role == Part::Cause && effect.id != "discretisation").count();
     let insufficient = insufficient.or_else(|| if physics == 0 { doubts.first().cloned() } else { None });
@@ -130,6 +136,7 @@ pub fn diagnose(
         () if is_unexplained => Verdict::Unexplained,
         () if physics == 0 && insufficient.is_some() && above(&best) > LEFT_OVER => Verdict::Unexplained,
         () if physics == 0 => Verdict::None,
+        () if effects.iter().any(|effect| effect.role == Part::Cause && effect.curve.is_some()) => Verdict::Located,
         () if effects.iter().any(|effect| effect.role == Part::Cause && !effect.tied_with.is_empty()) => Verdict::Tied,
         () => Verdict::Named,
     };
@@ -145,7 +152,7 @@ pub fn diagnose(
         (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
         _ => None,
     };
-    let unexplained = if is_unexplained {
+    let unexplained = if is_unexplained || (left > LEFT_OVER && unexplained_fraction > LEFT_SHARE) {
         super::residual_tests::describe(plant, &search.split, &search.estimator.used, &best.residuals)
     } else {
         Vec::new()
@@ -177,21 +184,29 @@ pub fn diagnose(
     quality.extend(faults::remarks(&bench, noise, plant));
     let extended = stage(&best, parameters(&best, &intervals));
     let failed = failing(&extended.residual_tests);
+    let has_rest = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE;
     let diagnosis = Diagnosis {
-        schema: 1,
+        schema: 2,
         dataset: name.to_owned(),
         verdict,
+        complete: verdict != Verdict::Unexplained && failed.is_none() && !has_rest,
         summary: summary(
             verdict,
             &effects,
+            &|place| plant.place_in_words(place),
             unexplained_fraction,
+            has_rest,
             insufficient.as_deref(),
             best.model().resolution,
             refined,
             failed.as_deref(),
         ),
         // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
-        unexplained_fraction: if is_unexplained { unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
+        unexplained_fraction: if is_unexplained || has_rest {
+            unexplained_fraction
+        } else {
+            unexplained_fraction.min(left.min(1.0))
+        },
         unexplained,
         noise_mm: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64,
         noise_correlated: noise.correlated,
@@ -238,15 +253,17 @@ struct Judged {
     remark: Option<String>,
 }
 
-/// Judges `best` against `bare`, the refined nominal model: the misfit left, the need of refinement, and the intervals of the causes.
-fn judge(search: &Search, mut best: Scored, bare: &Scored, nominal_resolution: f64) -> Result<Judged, DiagnoseError> {
+/// Judges `best` against `bare`, the refined nominal model: the misfit left, the need of refinement, and the intervals of the causes. `open` is what
+/// the model with free forms left (χ² per value above 1): what a name leaves beyond that is known to belong to its place.
+fn judge(search: &Search, mut best: Scored, bare: &Scored, open: f64, nominal_resolution: f64) -> Result<Judged, DiagnoseError> {
     let plant = search.estimator.plant;
     let count = search.estimator.count(&search.split.all());
     let above = |scored: &Scored| scored.above(count);
     let (left, whole) = (above(&best), above(bare));
     let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
     let cause_count = best.model().terms.len().max(2) as f64 - 1.0;
-    let is_unexplained = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE / cause_count;
+    let least = left.min(open);
+    let is_unexplained = least > LEFT_OVER && least > LEFT_SHARE / cause_count * whole;
     let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
     let mut remark = None;
     if unnamed && !best.model().terms.is_empty() {
@@ -332,6 +349,10 @@ struct Causes {
     coarse_total: f64,
     /// Number of single values that were masked.
     spikes: usize,
+    /// χ² per value above 1 of the model with free forms; infinite without any.
+    open: f64,
+    /// The names that were tried for free forms, by the name that stands or the free form.
+    nearest: Vec<(&'static str, Vec<Nearest>)>,
 }
 
 /// The causes, after the final refit; none where the data are insufficient.
@@ -363,6 +384,7 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
         }
     }
     search.estimator.only_given_faults = false;
+    name_causes(search, &mut causes)?;
 
     (search.progress)("the final refit");
     let mut best = search.fitted(&Model { fine: true, ..causes.best.model().clone() })?;
@@ -370,6 +392,23 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
     best = search.backward(best)?;
     causes.best = search.settle(best)?;
     Ok(causes)
+}
+
+/// Puts names in the stead of free forms where they stand.
+fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseError> {
+    let has_free_forms =
+        |search: &Search, scored: &Scored| scored.model().terms.iter().any(|term| search.candidate(term).is_free_form);
+    if !has_free_forms(search, &causes.best) {
+        return Ok(());
+    }
+    causes.open = causes.best.above(search.estimator.count(&search.split.all()));
+    let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
+    let of_term = best.model().terms.iter().zip(nearest).filter(|(_, tried)| !tried.is_empty());
+    causes.nearest = of_term.map(|(term, tried)| (search.candidate(term).id, tried)).collect();
+    causes.best = search.backward(best)?;
+    causes.replaced = search.replacements(&causes.best, 4)?;
+    causes.coarse_total = causes.best.total();
+    Ok(())
 }
 
 /// Forward selection, backward elimination and replacement; no causes where the data are insufficient.
@@ -414,7 +453,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.settle(best)?;
     }
     let coarse_total = best.total();
-    Ok(Causes { best, trials, replaced, coarse_total, spikes })
+    Ok(Causes { best, trials, replaced, coarse_total, spikes, open: f64::INFINITY, nearest: Vec::new() })
 }
 
 /// Why the data are insufficient to tell causes apart, if so.
@@ -499,13 +538,59 @@ fn adopted(
     Ok(Adopted {
         id: candidate.id.to_owned(),
         kind: candidate.kind.to_owned(),
+        place: candidate.places.first().copied().unwrap_or(candidate.kind).to_owned(),
         cause: candidate.cause.to_owned(),
         parameters: which.chain(estimates(search, index, term, found)).collect(),
         tied_with,
         share: (chi2(&without) - chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64,
         role: Part::Cause,
+        stability: None,
+        curve: curve(search, best, index, found),
+        nearest: Vec::new(),
         gain_heldout: gain(search, best, &without),
         fixed: form.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+    })
+}
+
+/// The curve of term `index` with its pointwise 95 % band, from the covariance of its weights; none of a named cause.
+fn curve(search: &Search, best: &Scored, index: usize, found: &Intervals) -> Option<Curve> {
+    let term = &best.model().terms[index];
+    let plant = search.estimator.plant;
+    let FreeCurve { x, y, points } = plant.curve(term)?;
+    let parameters = &search.candidate(term).parameters;
+    let first: usize = found.sizes[..index].iter().sum();
+    // Ordinates are linear in the weights.
+    let slopes: Vec<Vec<f64>> = (0..term.x.len())
+        .map(|k| {
+            let mut moved = term.clone();
+            let by = if term.x[k] + parameters[k].scale > parameters[k].bounds[1] {
+                -parameters[k].scale
+            } else {
+                parameters[k].scale
+            };
+            moved.x[k] += by;
+            let moved = plant.curve(&moved).map_or(Vec::new(), |curve| curve.points);
+            moved.iter().zip(&points).map(|(a, b)| (a[1] - b[1]) / by).collect()
+        })
+        .collect();
+    let half = |at: usize| {
+        let mut variance = 0.0;
+        for (i, a) in slopes.iter().enumerate() {
+            for (j, b) in slopes.iter().enumerate() {
+                variance += a[at] * b[at] * found.covariance[(first + i, first + j)];
+            }
+        }
+        1.96 * variance.max(0.0).sqrt()
+    };
+    let [x_name, x_unit, y_name, y_unit] = [x[0], x[1], y[0], y[1]].map(String::from);
+    Some(Curve {
+        x_name,
+        x_unit,
+        y_name,
+        y_unit,
+        x: points.iter().map(|[x, _]| *x).collect(),
+        y: points.iter().map(|[_, y]| *y).collect(),
+        ci95: points.iter().enumerate().map(|(at, [_, y])| [y - half(at), y + half(at)]).collect(),
     })
 }
 
@@ -567,6 +652,7 @@ fn discretisation(search: &Search, best: &Scored, coarse: &Scored) -> Adopted {
     Adopted {
         id: "discretisation".into(),
         kind: "numerics".into(),
+        place: "discretisation".into(),
         cause: "Finitely many joints and a finite time step stand for a continuum.".into(),
         parameters: vec![Estimate {
             name: "motors_per_actuator".into(),
@@ -578,6 +664,9 @@ fn discretisation(search: &Search, best: &Scored, coarse: &Scored) -> Adopted {
         tied_with: Vec::new(),
         share: 0.0,
         role: Part::Cause,
+        stability: None,
+        curve: None,
+        nearest: Vec::new(),
         gain_heldout: gain(search, best, coarse),
         fixed: Vec::new(),
     }

@@ -43,6 +43,10 @@ pub struct Candidate {
     pub kind: &'static str,
     /// The cause in a sentence.
     pub cause: &'static str,
+    /// Places of the model where it acts, the first one at home: names of one place are rivals.
+    pub places: Vec<&'static str>,
+    /// True for a free form: no law, but a curve that shows which law is missing at its place. Named candidates of the place are tried in its stead.
+    pub is_free_form: bool,
     /// True for a constant of the nominal model, which is fitted before other causes are tried.
     pub is_constant: bool,
     /// Fitted parameters.
@@ -60,6 +64,17 @@ pub struct Term {
     pub candidate: usize,
     /// One coordinate per parameter.
     pub x: Vec<f64>,
+}
+
+/// The curve that a free form stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeCurve {
+    /// Name and unit of the abscissa; the unit is empty for dimensionless ones.
+    pub x: [&'static str; 2],
+    /// Name and unit of the ordinate.
+    pub y: [&'static str; 2],
+    /// Its points.
+    pub points: Vec<[f64; 2]>,
 }
 
 /// What differs from run to run and is not part of the model.
@@ -153,6 +168,16 @@ pub trait Plant: Sync {
     /// True if a term exceeds the error of the discretisation.
     fn is_credible(&self, _term: &Term, _resolution: f64) -> bool {
         true
+    }
+
+    /// The curve of a term that is a free form; none of a named cause.
+    fn curve(&self, _term: &Term) -> Option<FreeCurve> {
+        None
+    }
+
+    /// The place of a cause in a sentence.
+    fn place_in_words(&self, place: &str) -> String {
+        place.replace('-', " ")
     }
 
     /// The values that `model` predicts for `run`, in the order and unit of [`Signal::values`]. What a plant ignores of

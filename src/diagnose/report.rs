@@ -47,6 +47,8 @@ pub(super) fn heading(d: &Diagnosis) -> String {
         (Verdict::None, true) => "Nothing named, but tests fail",
         (Verdict::Named, false) => "Named",
         (Verdict::Named, true) => "Named, but tests fail",
+        (Verdict::Located, false) => "Located",
+        (Verdict::Located, true) => "Located, but tests fail",
         (Verdict::Tied, false) => "Tied",
         (Verdict::Tied, true) => "Tied, and tests fail",
         (Verdict::Unexplained, _) => "Unexplained",

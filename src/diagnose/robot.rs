@@ -6,10 +6,11 @@ use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
 use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
-use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
+use super::plant::{Candidate, FreeCurve, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::response::Sine;
 use super::track::{ON_STEP, track};
+use super::visited::{Visit, visited};
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
@@ -147,15 +148,8 @@ impl RobotPlant {
                 response: run.response.clone(),
             });
         }
-        let mut candidates = candidates(&dataset.robot, dataset.markers.len());
         let is_at_zero = |run: &MeasuredRun| run.response.is_none() && run.command().1.iter().all(|v| *v == 0.0);
         let without_voltage = dataset.runs.iter().all(is_at_zero);
-        if without_voltage {
-            // What acts on voltages does nothing without any.
-            candidates.retain(|c| {
-                effects::find(c.id).is_none_or(|effect| !ON_VOLTAGES.contains(&effect.kind)) && c.id != "actuation-gain"
-            });
-        }
         let mut channels = dataset.channel_names();
         for channel in responses {
             channels.extend(["in phase", "in quadrature"].map(|part| format!("{} {part}", channels[channel])));
@@ -166,12 +160,33 @@ impl RobotPlant {
             channels,
             runs,
             signals,
-            candidates,
+            candidates: Vec::new(),
             bench: dataset.bench,
             exposure: 1e-3 * dataset.camera.exposure_ms.unwrap_or(0.0),
             without_voltage,
         };
-        plant.with_chosen_steps()
+        plant.with_chosen_steps().with_candidates()
+    }
+
+    /// Sets the candidates, free forms on the ranges that the runs visit.
+    fn with_candidates(mut self) -> Self {
+        let visit = |run: usize| {
+            let Run { robot, start, command, step, .. } = &self.runs[run];
+            let drive = command.table(&vec![1.0; self.nuisances(run)], 0.0);
+            Visit { robot, start, drive, step: *step, steps: self.steps_of(run, *step) }
+        };
+        let visits: Vec<_> = (0..self.runs.len()).map(visit).collect();
+        let bench = effects::Bench::new(&self.robot, self.markers.len());
+        // A nominal model that cannot be simulated is reported by the first prediction.
+        let mut all = visited(&visits).map_or(Vec::new(), |visited| candidates(&bench, &visited));
+        if self.without_voltage {
+            // What acts on voltages does nothing without any.
+            all.retain(|c| {
+                effects::find(c.id).is_none_or(|effect| !ON_VOLTAGES.contains(&effect.kind)) && c.id != "actuation-gain"
+            });
+        }
+        self.candidates = all;
+        self
     }
 
     /// Sets each run's time step to the longest that keeps its prediction within [`LARGEST_CHANGE`].
@@ -334,6 +349,19 @@ impl Plant for RobotPlant {
             _ => 0.5 / (resolution * resolution),
         };
         !candidate.is_constant || term.x.iter().any(|x| (x - 1.0).abs() > tolerance)
+    }
+
+    fn curve(&self, term: &Term) -> Option<FreeCurve> {
+        let Applied { effect, values } = self.applied(term).ok()?;
+        let shape = effect.shape.as_ref()?;
+        Some(FreeCurve { x: [shape.x, shape.x_unit], y: [shape.y, shape.y_unit], points: (shape.points)(&values) })
+    }
+
+    fn place_in_words(&self, place: &str) -> String {
+        effects::Place::ALL
+            .iter()
+            .find(|known| known.name() == place)
+            .map_or_else(|| place.to_owned(), |known| known.words().into())
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {

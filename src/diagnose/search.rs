@@ -12,7 +12,7 @@ use super::DiagnoseError;
 use super::dataset::Role;
 use super::fit::{BLOCK, Convergence, Estimator, Fit, Residuals, coordinates, sum_of_squares};
 use super::noise;
-use super::plant::{Free, Model, Plant, Signal, Term};
+use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
@@ -28,8 +28,9 @@ const LEAST_BIC: f64 = 10.0;
 const SEEN_BY_FIT: f64 = 0.1;
 /// Two models are tied if their χ² differ by less than this or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
-/// Candidates that are fitted after screening.
+/// Candidates that are fitted after screening: named ones and free forms.
 const FINALISTS: usize = 7;
+const FREE_FINALISTS: usize = 3;
 /// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
@@ -37,7 +38,7 @@ const MOST_TURNS: usize = 10;
 /// Most alternations between the spread of the bench's faults and the model.
 const MOST_SPREADS: usize = 3;
 /// Most causes in addition to the constants.
-const MOST_CAUSES: usize = 4;
+const MOST_CAUSES: usize = 6;
 
 /// Fit and held-out runs, by index.
 #[derive(Debug, Clone)]
@@ -237,11 +238,25 @@ impl Search<'_> {
     /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
-        let (sigmas, gain) = self.gap(more, less, runs);
+        let (_, gain) = self.gap(more, less, runs);
         let count = self.estimator.count(runs) as f64;
-        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
-            && sigmas > LEAST_SIGMAS
-            && more.bic() < less.bic() - LEAST_BIC
+        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
+    }
+
+    /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
+    fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
+        let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
+        self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
+    }
+
+    /// The candidate of a term.
+    pub fn candidate(&self, term: &Term) -> &Candidate {
+        &self.estimator.plant.candidates()[term.candidate]
+    }
+
+    /// True if the last term of a model is a free form.
+    fn ends_free(&self, model: &Model) -> bool {
+        model.terms.last().is_some_and(|term| self.candidate(term).is_free_form)
     }
 
     /// True if the runs cannot tell two models apart.
@@ -323,7 +338,11 @@ impl Search<'_> {
         let mut ranked = Vec::new();
         let columns: Vec<(Term, DVector<f64>)> =
             starts.into_iter().zip(columns).filter_map(|(term, column)| Some((term, column?))).collect();
-        for (term, column) in &columns {
+        for (candidate, _) in candidates.iter().enumerate().filter(|(_, c)| c.is_free_form) {
+            let own: Vec<_> = columns.iter().filter(|(term, _)| term.candidate == candidate).collect();
+            ranked.extend(self.free_start(&own, &rest).map(|(gain, term)| (gain, with(base, [term]))));
+        }
+        for (term, column) in columns.iter().filter(|(term, _)| !candidates[term.candidate].is_free_form) {
             let along = -rest.dot(column) / column.norm_squared();
             let (moved, right) = self.moved(term, along);
             let gain = if right { rest.dot(column).powi(2) / column.norm_squared() } else { 0.0 };
@@ -331,6 +350,36 @@ impl Search<'_> {
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         Ok(Screened { ranked, columns, rest })
+    }
+
+    /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
+    /// without those that leave their bounds, one after the other. None if nothing is left.
+    fn free_start(&self, columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Option<(f64, Term)> {
+        let mut kept: Vec<&(Term, DVector<f64>)> = columns.to_vec();
+        while let Some((first, _)) = kept.first() {
+            let n = kept.len();
+            let mut information = DMatrix::from_fn(n, n, |i, j| kept[i].1.dot(&kept[j].1));
+            (0..n).for_each(|k| information[(k, k)] *= 1.0 + 1e-6);
+            let right = DVector::from_fn(n, |k, _| -kept[k].1.dot(rest));
+            let weights = information.lu().solve(&right)?;
+            let mut term = Term { candidate: first.candidate, x: vec![0.0; first.x.len()] };
+            for ((start, _), weight) in kept.iter().zip(weights.iter()) {
+                term.x.iter_mut().zip(&start.x).for_each(|(x, by)| *x += weight * by);
+            }
+            let parameters = &self.candidate(&term).parameters;
+            let excess = |k: usize| {
+                let at = kept[k].0.x.iter().position(|x| *x != 0.0).unwrap_or(0);
+                let [low, high] = parameters[at].bounds;
+                (low - term.x[at]).max(term.x[at] - high) / parameters[at].scale
+            };
+            match (0..n).filter(|k| excess(*k) > 0.0).max_by(|a, b| excess(*a).total_cmp(&excess(*b))) {
+                Some(worst) => {
+                    kept.remove(worst);
+                }
+                None => return Some((right.dot(&weights), term)),
+            }
+        }
+        None
     }
 
     /// The two screened causes that would lower χ² most together, if by more than twice what the best does alone: other pairs are found one cause
@@ -345,6 +394,10 @@ impl Search<'_> {
                 // Least squares of −rest on the two.
                 let ([uu, ur], [vv, vr], uv) = (sizes[index], sizes[other], u.dot(v));
                 let determinant = uu * vv - uv * uv;
+                let is_free = |term: &Term| self.candidate(term).is_free_form;
+                if is_free(first) || is_free(second) {
+                    continue;
+                }
                 if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
                     continue;
                 }
@@ -397,7 +450,7 @@ impl Search<'_> {
     }
 
     /// The best screened starts of `count` different candidates.
-    fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
+    pub(super) fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
         let mut chosen: Vec<Model> = Vec::new();
         for (_, model) in screened {
             let last = |model: &Model| model.terms.last().map(|term| term.candidate);
@@ -415,7 +468,9 @@ impl Search<'_> {
     pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
         let screened = self.screen(from)?;
-        let finalists = self.finalists(&screened.ranked, FINALISTS);
+        let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
+        let mut finalists = self.finalists(named, FINALISTS);
+        finalists.extend(self.finalists(free, FREE_FINALISTS));
         let mut trials = Vec::new();
         for model in finalists {
             let Some(term) = model.terms.last() else { continue };
@@ -426,10 +481,12 @@ impl Search<'_> {
             }
         }
         // Possible winners are refitted: an unconverged fit may do better on held-out runs than a converged one.
-        let best = |by: &dyn Fn(&Scored) -> f64| {
-            (0..trials.len()).min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
+        let best = |by: &dyn Fn(&Scored) -> f64, free: bool| {
+            let of_kind = (0..trials.len()).filter(|k| self.ends_free(trials[*k].scored.model()) == free);
+            of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
         };
-        let mut ahead = vec![best(&|scored| self.judged(scored)), best(&|scored| scored.total())];
+        let judged = |scored: &Scored| self.judged(scored);
+        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false), best(&judged, true)];
         ahead.dedup();
         for index in ahead.into_iter().flatten() {
             let model = trials[index].scored.model().clone();
@@ -453,7 +510,14 @@ impl Search<'_> {
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
             let (trials, screened) = self.trials(&best)?;
-            let top = trials.first().map(|trial| trial.scored.clone());
+            // A free form has to be worth more than the best name.
+            let top_of =
+                |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
+            let top = match (top_of(false), top_of(true)) {
+                (Some(named), Some(free)) => Some(if self.is_worth(free, named) { free } else { named }),
+                (named, free) => named.or(free),
+            };
+            let top = top.cloned();
             let worthy = match top.filter(|top| self.is_worth(top, &best)) {
                 Some(top) => Some(top),
                 None => match self.seen_by_fit_runs(&mut best, &trials)? {
@@ -491,7 +555,8 @@ impl Search<'_> {
     /// A cause that shows in fit runs only: the run that it improves most is held out as well, and the cause, fitted to the others, has to improve it
     /// too. Keeps the new split if it does.
     fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Result<Option<Scored>, DiagnoseError> {
-        let Some(trial) = trials.iter().min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted)) else { return Ok(None) };
+        let named = trials.iter().filter(|trial| !self.ends_free(trial.scored.model()));
+        let Some(trial) = named.min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted)) else { return Ok(None) };
         let gain = |run: &usize| sum_of_squares(&base.residuals[*run]) - sum_of_squares(&trial.scored.residuals[*run]);
         let most = self.split.fit.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b)));
         let Some(run) = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base)) else {
@@ -535,11 +600,18 @@ impl Search<'_> {
             let shorter = (0..best.model().terms.len()).map(shorter).collect::<Result<Vec<_>, _>>()?;
             let Some(least) = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(best) };
             let least = self.fitted(least.model())?;
-            if self.is_worth(&best, &least) || self.is_seen_by_fit(&best, &least) {
+            if self.is_needed(&best, &least) || self.is_seen_by_fit(&best, &least) {
                 return Ok(best);
             }
             best = least;
         }
+    }
+
+    /// True if `less`, a model with one term less, leaves out too much: new physics has to be worth it, a constant has to be significant only.
+    fn is_needed(&self, more: &Scored, less: &Scored) -> bool {
+        let kept = |term: &Term| less.model().terms.iter().any(|other| other.candidate == term.candidate);
+        let is_constant = more.model().terms.iter().any(|term| !kept(term) && self.candidate(term).is_constant);
+        if is_constant { self.is_significant(more, less) } else { self.is_worth(more, less) }
     }
 
     /// Replaces every cause by other candidates, `most` of each: the index of the term, and the trial.
@@ -554,7 +626,8 @@ impl Search<'_> {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             let without = self.fitted(&model)?;
             let screened = self.screen(&without)?.ranked;
-            let others = screened.iter().filter(|(_, m)| m.terms.last().is_some_and(|term| term.candidate != removed.candidate));
+            let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
+            let others = screened.iter().filter(|(_, m)| is_other(m) && !self.ends_free(m));
             for model in self.finalists(others, most) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
@@ -716,8 +789,6 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::plant::Candidate;
-
     /// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
     struct Waves {
         signals: Vec<Signal>,
@@ -757,6 +828,8 @@ mod tests {
                 id,
                 kind: "test",
                 cause: "A wave.",
+                places: vec!["test"],
+                is_free_form: false,
                 is_constant: false,
                 parameters: vec![Free {
                     name: "x",

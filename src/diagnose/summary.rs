@@ -36,12 +36,26 @@ pub fn failing(tests: &[ResidualTest]) -> Option<String> {
     Some(format!("{count} of {} residual tests still {verb}, more than chance explains ({})", tests.len(), list.join(", ")))
 }
 
-/// The verdict in a sentence. `left` is the unexplained fraction, `insufficient` why the data are insufficient, `failing` the result of [`failing`]
+/// A place whose law has no name here: the place, and the nearest names with what they leave.
+fn located(effect: &Adopted, place_in_words: &dyn Fn(&str) -> String) -> String {
+    let near: Vec<String> = effect
+        .nearest
+        .iter()
+        .take(2)
+        .map(|near| format!("{} leaves {:.0} % of it", names::cause(&near.id), 100.0 * near.left))
+        .collect();
+    let near = if near.is_empty() { String::new() } else { format!(" ({})", near.join(", ")) };
+    format!("another law of {}, shown as a curve{near}", place_in_words(&effect.place))
+}
+
+/// The verdict in a sentence. `has_rest` is true if more than chance and a small share is left. `left` is the unexplained fraction, `insufficient` why the data are insufficient, `failing` the result of [`failing`]
 /// for the extended model.
 pub(super) fn summary(
     verdict: Verdict,
     effects: &[Adopted],
+    place_in_words: &dyn Fn(&str) -> String,
     left: f64,
+    has_rest: bool,
     insufficient: Option<&str>,
     resolution: f64,
     refined: bool,
@@ -50,6 +64,9 @@ pub(super) fn summary(
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
     let name = |effect: &Adopted| {
+        if effect.curve.is_some() {
+            return located(effect, place_in_words);
+        }
         let parameters: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();
         format!("{} ({})", names::with_form(&effect.id, &names::form_of(effect)), parameters.join("; "))
     };
@@ -64,7 +81,10 @@ pub(super) fn summary(
                 "No cause in the library is needed: the nominal model{finely} leaves residuals of the size of the noise, but {failing}."
             ),
         },
-        Verdict::Named => format!("The simulation lacks: {named}{but}."),
+        Verdict::Named | Verdict::Located => {
+            let rest = if has_rest { format!(", and {:.1} % of the misfit is left", 100.0 * left) } else { String::new() };
+            format!("The simulation lacks: {named}{rest}{but}.")
+        }
         Verdict::Tied => {
             let ties: Vec<_> = physics
                 .iter()
@@ -129,12 +149,12 @@ mod tests {
         assert_eq!(words, "3 of 80 residual tests still fail, more than chance explains (drift in log time 2, loop area 1)");
         for verdict in [Verdict::None, Verdict::Named, Verdict::Tied, Verdict::Unexplained] {
             for insufficient in [None, Some("one run is too little")] {
-                let first = |failing| summary(verdict, &[], 0.3, insufficient, 10.0, true, failing);
+                let first = |failing| summary(verdict, &[], &str::to_owned, 0.3, false, insufficient, 10.0, true, failing);
                 assert!(first(Some(words.as_str())).split(". ").next().unwrap().contains(&words), "{verdict:?}");
                 assert!(!first(None).contains("residual tests"));
             }
         }
-        let honest = summary(Verdict::None, &[], 0.0, None, 3.0, false, Some(&words));
+        let honest = summary(Verdict::None, &[], &str::to_owned, 0.0, false, None, 3.0, false, Some(&words));
         assert!(!honest.contains("explains the data"), "{honest}");
     }
 }

@@ -38,15 +38,7 @@ pub(super) fn track(
     let mut volts = vec![0.0; n];
     drive.voltages(0.0, &mut volts);
     chain.settle(&mut volts);
-    match *start {
-        Start::Level => {}
-        Start::Settled => engine.settle(&volts)?,
-        Start::Hung(mass) => {
-            let position = robot.material.actuator_length * robot.actuators as f64;
-            engine.load(0, &weighed(robot, h, &volts, PointMass { mass, position })?.save()?)?;
-        }
-        Start::Held { position, z } => engine.load(0, &held(robot, h, &volts, position, z)?.save()?)?,
-    }
+    put(&mut engine, robot, h, start, &volts)?;
 
     let origin = -0.5 * robot.segments()[0].length;
     let places = places(robot, markers);
@@ -112,6 +104,22 @@ pub(super) fn track(
         Ok(tracks)
     } else {
         Err(EngineError::NotFinite { what: "a marker".into(), value: f64::NAN, step, time: step as f64 * h, stable_step: None })
+    }
+}
+
+/// Puts an engine of `robot`, as it was built with steps of `h` (s), into the state `start` under constant `volts` (V).
+///
+/// # Errors
+/// [`EngineError`] if there is no such equilibrium.
+pub(super) fn put(engine: &mut PlanarEngine, robot: &Robot, h: f64, start: &Start, volts: &[f64]) -> Result<(), EngineError> {
+    match *start {
+        Start::Level => Ok(()),
+        Start::Settled => engine.settle(volts),
+        Start::Hung(mass) => {
+            let position = robot.material.actuator_length * robot.actuators as f64;
+            engine.load(0, &weighed(robot, h, volts, PointMass { mass, position })?.save()?)
+        }
+        Start::Held { position, z } => engine.load(0, &held(robot, h, volts, position, z)?.save()?),
     }
 }
 

@@ -36,6 +36,11 @@ pub struct Table {
 }
 
 impl Table {
+    /// Voltages (V), rows × actuators.
+    pub fn volts(&self) -> &[f64] {
+        &self.voltages
+    }
+
     /// A table of `times.len()` rows of `actuators` voltages (V) each. Times (s) must rise strictly.
     ///
     /// # Errors

@@ -8,7 +8,9 @@
 
 mod actuation;
 mod calibration;
+mod curve;
 mod driver;
+mod fitting;
 mod ground;
 mod measurement;
 mod numerics;
@@ -16,6 +18,7 @@ mod signal_chain;
 mod structure;
 mod view;
 
+pub use fitting::{Bench, Fitting, Form, Place, Shape, fits};
 pub use signal_chain::{SignalChain, SignalStage};
 pub use view::View;
 
@@ -121,6 +124,12 @@ pub struct Effect {
     pub source: &'static str,
     /// Its parameters.
     pub parameters: &'static [Parameter],
+    /// Where it acts in the equations: first where it is at home, then the places whose free form it may be mistaken for.
+    pub places: &'static [Place],
+    /// How it is fitted to measured data.
+    pub fitting: Fitting,
+    /// The curve that a free form stands for; none of a named one.
+    pub shape: Option<Shape>,
     /// Its action.
     pub action: Action,
 }
@@ -139,13 +148,23 @@ pub static EFFECTS: &[&Effect] = &[
     &structure::DRY_FRICTION,
     &structure::STRUCTURAL_DAMPING,
     &structure::AIR_DRAG,
+    &structure::FREE_MOMENT_OF_DEVIATION,
+    &structure::FREE_MOMENT_OF_RATE,
+    &structure::FREE_JOINT_MEMORY,
+    &structure::FREE_JOINT_SLIP,
+    &structure::FREE_MASS,
+    &structure::FREE_DRAG,
     &driver::TIME_DELAY,
     &driver::SATURATION,
     &driver::SLEW_LIMIT,
     &driver::DRIVER_LAG,
+    &driver::FREE_DRIVE_FILTER,
     &actuation::HYSTERESIS,
     &actuation::CREEP,
+    &actuation::FREE_VOLTAGE_PLAYS,
+    &actuation::FREE_VOLTAGE_MEMORY,
     &actuation::FIELD_DEPENDENT_GAIN,
+    &actuation::FREE_VOLTAGE_CURVE,
     &actuation::POLARITY_ASYMMETRY,
     &actuation::WEAK_ACTUATOR,
     &actuation::PASSIVE_MARGIN,

@@ -376,18 +376,17 @@ impl Engine for BulletEngine {
     }
 
     fn save(&self) -> Result<Vec<f64>, EngineError> {
-        let mut state: Vec<f64> =
-            self.extensions.iter().flat_map(|extensions| extensions.loss.iter().flatten().copied()).collect();
+        let mut state: Vec<f64> = self.extensions.iter().flat_map(|extensions| extensions.memory.iter().copied()).collect();
         state.extend(self.world.snapshot()?.into_vec());
         Ok(state)
     }
 
     fn load(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
-        let memory = self.extensions.as_ref().map_or(0, |extensions| extensions.loss.as_flattened().len());
+        let memory = self.extensions.as_ref().map_or(0, |extensions| extensions.memory.len());
         let (memory, world) = state.split_at_checked(memory).ok_or(EngineError::State)?;
         self.world.restore(&Snapshot::from_vec(world.to_vec()))?;
         if let Some(extensions) = &mut self.extensions {
-            extensions.loss.as_flattened_mut().copy_from_slice(memory);
+            extensions.memory.copy_from_slice(memory);
         }
         self.step = step;
         Ok(())

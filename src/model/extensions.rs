@@ -1,5 +1,7 @@
 //! What a robot has beyond the plain model. Everything is off by default, and off costs nothing and changes no bit.
 
+use super::curve::Curve;
+
 /// Additions to the plain robot that both engines know how to step. [`crate::effects`] sets them; the fields are in CGS units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extensions {
@@ -25,16 +27,31 @@ pub struct Extensions {
     pub softening: f64,
     /// Moment of dry friction in every joint (dyn·cm).
     pub dry_friction: f64,
-    /// ξ: stiffness added per decade of the loss ladder, as a share of a joint's (–).
-    pub loss: f64,
-    /// Drag coefficient of the sheet in air (–).
-    pub drag: f64,
+    /// Moment (dyn·cm) of a joint against its elastic curvature (1/cm), beside the linear one.
+    pub moment_of_curvature: Curve,
+    /// Moment (dyn·cm) of a joint against the rate of its curvature (1/(cm·s)), beside the linear one.
+    pub moment_of_rate: Curve,
+    /// Springs with a limit beside every joint.
+    pub slips: Vec<Slip>,
+    /// ξ_j: stiffness of each unit of the Maxwell chain of [`LOSS_TIMES`], as a share of a joint's (–).
+    pub loss: [f64; LOSS_TIMES.len()],
+    /// Drag coefficient of the sheet in air at [`DRAG_SPEED`] (–), in parts that depend on the speed by [`DRAG_POWERS`].
+    pub drag: [f64; DRAG_POWERS.len()],
     /// Slope of the floor (rad), positive if it rises along +x.
     pub slope: f64,
     /// Share of the approach speed that contact returns (–).
     pub restitution: f64,
     /// How friction depends on the sliding speed.
     pub stick_slip: StickSlip,
+}
+
+/// A spring that slips at a moment: friction that begins with elastic presliding (Jenkins's element; Iwan 1966).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slip {
+    /// Moment at which it slips (dyn·cm).
+    pub moment: f64,
+    /// Curvature from rest at which it slips (1/cm).
+    pub curvature: f64,
 }
 
 /// A mass at a point of the sheet's centre line.
@@ -81,8 +98,11 @@ impl Default for Extensions {
             joint_gains: Vec::new(),
             softening: 0.0,
             dry_friction: 0.0,
-            loss: 0.0,
-            drag: 0.0,
+            moment_of_curvature: Curve::ZERO,
+            moment_of_rate: Curve::ZERO,
+            slips: Vec::new(),
+            loss: [0.0; LOSS_TIMES.len()],
+            drag: [0.0; DRAG_POWERS.len()],
             slope: 0.0,
             restitution: 0.0,
             stick_slip: StickSlip::OFF,
@@ -99,21 +119,62 @@ pub const LOSS_TIMES: [f64; 5] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 /// Links whose lowest edge is below this height (cm) are on the floor as far as viscous friction goes: Bullet's reach of contacts. The force
 /// on a link cannot tell, for a flat robot's weight may rest on some links alone.
 pub const VISCOUS_REACH: f64 = 0.02;
+/// Powers of the speed in the parts of drag: linear, quadratic, cubic.
+pub const DRAG_POWERS: [i32; 3] = [1, 2, 3];
+/// Speed at which the parts of drag have their coefficients (cm/s).
+pub const DRAG_SPEED: f64 = 100.0;
 /// Density of air (g/cm³).
 pub const AIR_DENSITY: f64 = 1.2e-3;
 
 impl Extensions {
     /// Whether the joints' torque law has terms beyond eq. 1.
     pub fn bends_torque_law(&self) -> bool {
-        self.softening != 0.0 || self.dry_friction != 0.0 || self.loss != 0.0
+        self.softening != 0.0
+            || self.dry_friction != 0.0
+            || self.has_loss()
+            || !self.slips.is_empty()
+            || !self.moment_of_curvature.is_zero()
+            || !self.moment_of_rate.is_zero()
+    }
+
+    /// Whether joints have a Maxwell chain.
+    pub fn has_loss(&self) -> bool {
+        self.loss != [0.0; LOSS_TIMES.len()]
+    }
+
+    /// Whether the sheet has drag in air.
+    pub fn has_drag(&self) -> bool {
+        self.drag != [0.0; DRAG_POWERS.len()]
+    }
+
+    /// Force against the motion per length of a sheet (dyn/cm) of the given `width` (cm), per normal speed `v` (cm/s): dyn·s/cm².
+    pub fn drag_per_speed(&self, width: f64, v: f64) -> f64 {
+        let [linear, quadratic, cubic] = self.drag;
+        let ratio = v.abs() / DRAG_SPEED;
+        0.5 * AIR_DENSITY * width * DRAG_SPEED * (linear + ratio * (quadratic + ratio * cubic))
     }
 
     /// Torque of a joint beyond eq. 1 (dyn·cm) at the elastic angle `delta` (rad) and the rate (rad/s), for a joint of stiffness `k`
-    /// (dyn·cm/rad) that stands for the length `link` (cm): softening and dry friction.
+    /// (dyn·cm/rad) that stands for the length `link` (cm): softening, curves and dry friction.
     pub fn torque(&self, k: f64, link: f64, delta: f64, rate: f64) -> f64 {
         let strain = self.softening * (delta / link).powi(2);
         let softened = k * delta * strain.min(1.0 - LEAST_STIFFNESS);
-        let friction = if self.dry_friction == 0.0 { 0.0 } else { self.dry_friction * (rate / DRY_FRICTION_RATE).tanh() };
-        softened - friction
+        softened - self.moment_of_curvature.at(delta / link)[0] - self.friction(link, rate)[0]
+    }
+
+    /// Moment against a joint's rate (rad/s) and its derivative (dyn·cm, dyn·cm·s): dry friction and the curve of the rate.
+    pub fn friction(&self, link: f64, rate: f64) -> [f64; 2] {
+        let [mut moment, mut slope] = [0.0; 2];
+        if self.dry_friction != 0.0 {
+            let share = (rate / DRY_FRICTION_RATE).tanh();
+            moment = self.dry_friction * share;
+            slope = self.dry_friction / DRY_FRICTION_RATE * (1.0 - share * share);
+        }
+        if !self.moment_of_rate.is_zero() {
+            let [value, tangent] = self.moment_of_rate.at(rate / link);
+            moment += value;
+            slope += tangent / link;
+        }
+        [moment, slope]
     }
 }

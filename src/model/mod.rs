@@ -12,13 +12,16 @@
 //! | static tip at −1000 V, m = 3 | −19.0 mm | −23.4 mm | −20 mm |
 
 mod builder;
+mod curve;
 mod extensions;
 mod laminate;
 mod robot;
 pub mod units;
 
+pub use curve::{CURVE_POINTS, Curve};
 pub use extensions::{
-    AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, StickSlip, VISCOUS_REACH,
+    AIR_DENSITY, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, Slip, StickSlip,
+    VISCOUS_REACH,
 };
 pub use laminate::{Laminate, Material};
 pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment, box_inertia};

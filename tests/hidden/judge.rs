@@ -39,6 +39,10 @@ pub fn is_right(d: &Diagnosis, hidden: &str) -> bool {
     let [effect] = physics(d)[..] else { return false };
     let set = INSEPARABLE.iter().find(|set| set.contains(&hidden)).copied().unwrap_or_default();
     let allowed = |id: &str| id == hidden || set.contains(&id);
+    let is_nearest = effect.nearest.first().is_some_and(|near| allowed(&near.id));
+    if d.verdict == Verdict::Located {
+        return is_nearest;
+    }
     matches!(d.verdict, Verdict::Named | Verdict::Tied)
         && allowed(&effect.id)
         && effect.tied_with.iter().all(|id| allowed(id))

@@ -17,6 +17,8 @@ use super::diagnosis::{Adopted, Diagnosis, Estimate, Part, Ranked, RunError, Sta
 use super::fit::{Convergence, Estimator, Fit};
 use super::names;
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
+use super::visited::Visited;
+use crate::effects::Bench;
 use crate::experiment::{self, Control, EffectConfig, Source};
 use crate::number::fixed;
 use config::config;
@@ -121,7 +123,11 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         channels: vec![0],
         inputs: vec![0.0],
     });
-    let plant = Numbers { dataset, signals: signals.collect(), candidates: candidates(&dataset.robot, 1) };
+    let plant = Numbers {
+        dataset,
+        signals: signals.collect(),
+        candidates: candidates(&Bench::new(&dataset.robot, 1), &Visited::NOTHING),
+    };
     let runs: Vec<usize> = (0..plant.signals.len()).collect();
     let estimator = Estimator::new(&plant);
     let resolution = dataset.robot.motors_per_actuator as f64;
@@ -131,7 +137,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
 
     // One cause at a time, then two constants; all that explain the numbers are listed.
     let mut fits: Vec<Fit> = Vec::new();
-    for (candidate, c) in plant.candidates.iter().enumerate().filter(|(_, c)| c.parameters.len() == 1) {
+    for (candidate, c) in plant.candidates.iter().enumerate().filter(|(_, c)| c.parameters.len() == 1 && !c.is_free_form) {
         progress(c.id);
         let tried = c.starts.iter().filter_map(|x| {
             let terms = vec![Term { candidate, x: x.clone() }];
@@ -190,7 +196,11 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
                     }],
                     tied_with: Vec::new(),
                     share: 1.0,
+                    place: c.places.first().copied().unwrap_or(c.kind).to_owned(),
                     role: Part::Cause,
+                    stability: None,
+                    curve: None,
+                    nearest: Vec::new(),
                     gain_heldout: 0.0,
                     fixed: c.fixed.iter().map(|(name, value)| ((*name).into(), *value)).collect(),
                 }
@@ -257,9 +267,10 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         listed.iter().map(|fit| Explanation { effects: adopted(fit), misfit: (fit.chi2 / count).sqrt() }).collect();
     let numbers = numbers.collect();
     let diagnosis = Diagnosis {
-        schema: 1,
+        schema: 2,
         dataset: dataset.name.clone(),
         verdict,
+        complete: verdict != Verdict::Unexplained,
         summary,
         effects,
         unexplained_fraction: if nominal.chi2 > count { ((best.chi2 - count).max(0.0) / (nominal.chi2 - count)).min(1.0) } else { 0.0 },

@@ -20,7 +20,7 @@
 //! # Source
 //! Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const CREEP: Effect = Effect {
@@ -64,6 +64,28 @@ pub const CREEP: Effect = Effect {
             about: "largest time constant T_max; 0 is three times the run's length",
         },
     ],
+    places: &[Place::VoltageMemory],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2)],
+                starts: &[&[0.02, 0.0]],
+                given: &[("rungs_per_decade", 1.0)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2)],
+                starts: &[&[0.02, 0.0]],
+                given: &[("rungs_per_decade", 2.0)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
+                starts: &[&[0.02, 0.3], &[0.02, 3.0]],
+                given: &[("rungs_per_decade", 0.0)],
+            },
+        ],
+    },
+    shape: None,
     action: Action::Voltages(|p, n, duration| {
         let chain = Chain { growth: p[0], power: p[1], per_decade: p[2], fastest: p[3] };
         let elements = chain.up_to(if p[4] > 0.0 { p[4] } else { 3.0 * duration });

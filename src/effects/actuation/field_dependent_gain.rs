@@ -11,7 +11,7 @@
 //! # Source
 //! Data sheet of the MFC actuator: 400 pm/V below, 460 pm/V above 1 kV/mm; polynomial from general knowledge.
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const FIELD_DEPENDENT_GAIN: Effect = Effect {
@@ -31,6 +31,12 @@ pub const FIELD_DEPENDENT_GAIN: Effect = Effect {
             about: "b₂",
         },
     ],
+    places: &[Place::VoltageCurve],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("slope_per_kv", 0.05), ("curvature_per_kv2", 0.03)], starts: &[&[0.05, 0.0]], given: &[] }],
+    },
+    shape: None,
     action: Action::Voltages(|p, _, _| Box::new(Gain { slope: 1e-3 * p[0], curvature: 1e-6 * p[1] })),
 };
 

@@ -31,7 +31,7 @@
 //! # Source
 //! Data sheet of the MFC actuator (width about 0.2); asymmetric loops: Fu et al., Sens. Actuators A 346 (2022) 113830.
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const HYSTERESIS: Effect = Effect {
@@ -101,6 +101,28 @@ pub const HYSTERESIS: Effect = Effect {
             about: "1: the gain follows from the loop, so that a full stroke of 1500 V is as long with it as without; 0: it is gain",
         },
     ],
+    places: &[Place::VoltageMemory],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[
+            Form {
+                fitted: &[("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3)],
+                starts: &[&[0.05, 0.2, 0.0], &[0.2, 0.6, 0.0]],
+                given: &[("exponent", 1.0), ("plays", 0.0), ("pinned", 1.0)],
+            },
+            Form {
+                fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                starts: &[&[0.05, 0.0, 1.0], &[0.2, 0.5, 1.0]],
+                given: &[("plays", 1.0), ("from_zero", 0.0), ("pinned", 1.0)],
+            },
+            Form {
+                fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                starts: &[&[0.05, 0.0, 1.0]],
+                given: &[("plays", 1.0), ("from_zero", 1.0), ("pinned", 1.0)],
+            },
+        ],
+    },
+    shape: None,
     action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p, n)) }),
 };
 

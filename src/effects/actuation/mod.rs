@@ -2,6 +2,9 @@
 
 mod creep;
 mod field_dependent_gain;
+mod free_voltage_curve;
+mod free_voltage_memory;
+mod free_voltage_plays;
 mod hysteresis;
 mod passive_margin;
 mod polarity_asymmetry;
@@ -9,6 +12,9 @@ mod weak_actuator;
 
 pub use creep::CREEP;
 pub use field_dependent_gain::FIELD_DEPENDENT_GAIN;
+pub use free_voltage_curve::FREE_VOLTAGE_CURVE;
+pub use free_voltage_memory::FREE_VOLTAGE_MEMORY;
+pub use free_voltage_plays::FREE_VOLTAGE_PLAYS;
 pub use hysteresis::HYSTERESIS;
 pub use passive_margin::PASSIVE_MARGIN;
 pub use polarity_asymmetry::POLARITY_ASYMMETRY;

@@ -10,7 +10,7 @@
 //! # Source
 //! Geometry of the M-8514 patch, by inference; derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const PASSIVE_MARGIN: Effect = Effect {
@@ -27,6 +27,12 @@ pub const PASSIVE_MARGIN: Effect = Effect {
         default: None,
         about: "share p of an actuator’s length that is passive, half of it at each end",
     }],
+    places: &[Place::GainAlong],
+    fitting: Fitting::Candidate {
+        on: fits::shape,
+        forms: &[Form { fitted: &[("fraction", 0.05)], starts: &[&[0.08]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);
         robot.extensions.joint_gains.resize(joints, 1.0);

@@ -10,7 +10,7 @@
 //! # Source
 //! The reference's constant 1.733; asymmetry: nonlinear equivalent piezoelectric coefficient of MFCs, 2016.
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const POLARITY_ASYMMETRY: Effect = Effect {
@@ -27,6 +27,9 @@ pub const POLARITY_ASYMMETRY: Effect = Effect {
         default: None,
         about: "gain r of positive voltages, on top of positive_gain",
     }],
+    places: &[Place::VoltageCurve],
+    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("ratio", 0.2)], starts: &[&[1.2]], given: &[] }] },
+    shape: None,
     action: Action::Voltages(|p, _, _| Box::new(Ratio(p[0]))),
 };
 

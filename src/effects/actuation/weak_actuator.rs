@@ -11,7 +11,7 @@
 //! # Source
 //! From general knowledge.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const WEAK_ACTUATOR: Effect = Effect {
@@ -24,6 +24,12 @@ pub const WEAK_ACTUATOR: Effect = Effect {
         Parameter { name: "actuator", unit: "", bounds: [1.0, 1e4], off: None, default: None, about: "the actuator, from 1" },
         Parameter { name: "gain", unit: "", bounds: [0.0, 1.5], off: Some(1.0), default: None, about: "remaining gain" },
     ],
+    places: &[Place::GainAlong],
+    fitting: Fitting::Candidate {
+        on: fits::several_actuators,
+        forms: &[Form { fitted: &[("gain", 0.1)], starts: &[&[0.95]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| {
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);
         robot.extensions.joint_gains.resize(joints, 1.0);

@@ -10,7 +10,7 @@
 //! # Source
 //! Free strain: Williams, thesis, 2004; shear lag in the bond: Crawley and de Luis 1987.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const ACTUATION_GAIN: Effect = Effect {
@@ -20,5 +20,8 @@ pub const ACTUATION_GAIN: Effect = Effect {
     equation: "θ_V = −s·γ·ℓ·V",
     source: "Free strain: Williams, thesis, 2004; shear lag in the bond: Crawley and de Luis 1987.",
     parameters: &[Parameter::scale([0.4, 2.0], "factor s on the curvature per volt")],
+    places: &[Place::VoltageCurve],
+    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }] },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.gain_scale *= p[0]),
 };

@@ -10,7 +10,7 @@
 //! # Source
 //! Derived; data sheet of the MFC actuator, Smart Material Corp.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const AREAL_MASS: Effect = Effect {
@@ -20,5 +20,8 @@ pub const AREAL_MASS: Effect = Effect {
     equation: "M = s·μ_A·w·L",
     source: "Derived; data sheet of the MFC actuator, Smart Material Corp.",
     parameters: &[Parameter::scale([0.5, 2.0], "factor s on the mass of every link")],
+    places: &[Place::Mass],
+    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }] },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.mass_scale *= p[0]),
 };

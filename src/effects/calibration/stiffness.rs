@@ -10,7 +10,7 @@
 //! # Source
 //! Derived from eq. 1; spread of MFC parameters: Hu, Smith, Hays, Oates, CDC-ECC 2011.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const STIFFNESS: Effect = Effect {
@@ -20,5 +20,8 @@ pub const STIFFNESS: Effect = Effect {
     equation: "τ = −s·k·(θ − θ_V + η·θ̇)",
     source: "Derived from eq. 1; spread of MFC parameters: Hu, Smith, Hays, Oates, CDC-ECC 2011.",
     parameters: &[Parameter::scale([0.5, 2.0], "factor s on the stiffness k")],
+    places: &[Place::Stiffness],
+    fitting: Fitting::Candidate { on: fits::any, forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }] },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.stiffness_scale *= p[0]),
 };

@@ -11,7 +11,7 @@
 //! Capacitance per area: data sheet of the MFC actuator; derived.
 
 use super::follower::{Follower, Law};
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const DRIVER_LAG: Effect = Effect {
@@ -28,6 +28,12 @@ pub const DRIVER_LAG: Effect = Effect {
         default: None,
         about: "time constant T",
     }],
+    places: &[Place::Drive],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("time_constant_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
+    },
+    shape: None,
     action: Action::Voltages(|p, n, _| Box::new(Follower::new(Lag { time: p[0] }, n))),
 };
 

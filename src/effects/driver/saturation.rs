@@ -11,7 +11,7 @@
 //! # Source
 //! Limits of the MFC actuator: data sheet, Smart Material Corp.
 
-use crate::effects::{Action, Effect, Kind, Parameter, SignalStage};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const SATURATION: Effect = Effect {
@@ -38,6 +38,19 @@ pub const SATURATION: Effect = Effect {
             about: "least voltage V_lo",
         },
     ],
+    places: &[Place::VoltageCurve, Place::Drive],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[
+            Form { fitted: &[("min_v", 0.0002)], starts: &[&[-1.0 / 1300.0], &[-1.0 / 1000.0], &[-1.0 / 700.0]], given: &[] },
+            Form {
+                fitted: &[("max_v", 0.0002)],
+                starts: &[&[1.0 / 1300.0], &[1.0 / 800.0], &[1.0 / 400.0], &[1.0 / 200.0]],
+                given: &[],
+            },
+        ],
+    },
+    shape: None,
     action: Action::Voltages(|p, _, _| Box::new(Limits { max: p[0], min: p[1] })),
 };
 

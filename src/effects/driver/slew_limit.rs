@@ -11,7 +11,7 @@
 //! Derived: S = I_max/C.
 
 use super::follower::{Follower, Law};
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const SLEW_LIMIT: Effect = Effect {
@@ -28,6 +28,16 @@ pub const SLEW_LIMIT: Effect = Effect {
         default: None,
         about: "largest rate S",
     }],
+    places: &[Place::Drive],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form {
+            fitted: &[("rate_v_per_s", 2e-06)],
+            starts: &[&[1.5e-06], &[3e-06], &[6e-06], &[1.2e-05], &[2.5e-05]],
+            given: &[],
+        }],
+    },
+    shape: None,
     action: Action::Voltages(|p, n, _| Box::new(Follower::new(Slew { rate: p[0] }, n))),
 };
 

@@ -13,7 +13,7 @@
 //! # Source
 //! Newton's law of impact; the threshold is Bullet's.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const CONTACT_RESTITUTION: Effect = Effect {
@@ -30,5 +30,11 @@ pub const CONTACT_RESTITUTION: Effect = Effect {
         default: None,
         about: "share e of the approach speed that is returned",
     }],
+    places: &[Place::Impact],
+    fitting: Fitting::Candidate {
+        on: fits::on_the_floor,
+        forms: &[Form { fitted: &[("restitution", 0.1)], starts: &[&[0.1], &[0.4]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.restitution = p[0]),
 };

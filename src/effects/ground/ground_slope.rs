@@ -10,7 +10,7 @@
 //! # Source
 //! Derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const GROUND_SLOPE: Effect = Effect {
@@ -27,5 +27,11 @@ pub const GROUND_SLOPE: Effect = Effect {
         default: None,
         about: "slope α, positive uphill along +x",
     }],
+    places: &[Place::Floor],
+    fitting: Fitting::Candidate {
+        on: fits::on_the_floor,
+        forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.5]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.slope += p[0].to_radians()),
 };

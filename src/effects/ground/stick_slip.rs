@@ -12,7 +12,7 @@
 //! # Source
 //! Stribeck friction: Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 use crate::model::StickSlip;
 
 /// See the file's head.
@@ -48,5 +48,11 @@ pub const STICK_SLIP: Effect = Effect {
             about: "viscous force F_v per speed and link on the floor",
         },
     ],
+    places: &[Place::FloorFriction],
+    fitting: Fitting::Candidate {
+        on: fits::on_the_floor,
+        forms: &[Form { fitted: &[("static_ratio", 0.2)], starts: &[&[1.2]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.stick_slip = StickSlip { ratio: p[0], speed: 0.1 * p[1], viscous: p[2] }),
 };

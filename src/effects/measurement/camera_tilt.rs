@@ -10,7 +10,7 @@
 //! # Source
 //! Derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const CAMERA_TILT: Effect = Effect {
@@ -27,5 +27,11 @@ pub const CAMERA_TILT: Effect = Effect {
         default: None,
         about: "roll ψ",
     }],
+    places: &[Place::Picture],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("angle_deg", 0.5)], starts: &[&[0.3]], given: &[] }],
+    },
+    shape: None,
     action: Action::View(|p, view| view.tilt += p[0].to_radians()),
 };

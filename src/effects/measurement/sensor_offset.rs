@@ -11,7 +11,7 @@
 //! # Source
 //! From general knowledge.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const SENSOR_OFFSET: Effect = Effect {
@@ -24,5 +24,11 @@ pub const SENSOR_OFFSET: Effect = Effect {
         Parameter { name: "x_mm", unit: "mm", bounds: [-100.0, 100.0], off: Some(0.0), default: Some(0.0), about: "added to x" },
         Parameter { name: "z_mm", unit: "mm", bounds: [-100.0, 100.0], off: Some(0.0), default: Some(0.0), about: "added to z" },
     ],
+    places: &[Place::Picture],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("x_mm", 0.2), ("z_mm", 0.2)], starts: &[&[0.1, 0.1]], given: &[] }],
+    },
+    shape: None,
     action: Action::View(|p, view| view.offset = [view.offset[0] + 0.1 * p[0], view.offset[1] + 0.1 * p[1]]),
 };

@@ -11,7 +11,7 @@
 //! # Source
 //! Derived: the chain against the Euler-Bernoulli beam.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Kind, Parameter, Place};
 
 /// See the file's head.
 pub const DISCRETISATION: Effect = Effect {
@@ -38,5 +38,8 @@ pub const DISCRETISATION: Effect = Effect {
             about: "factor on the time step",
         },
     ],
+    places: &[Place::Discretisation],
+    fitting: Fitting::Excluded("the search refines the discretisation by itself"),
+    shape: None,
     action: Action::Discretisation,
 };

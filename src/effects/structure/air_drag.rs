@@ -10,7 +10,7 @@
 //! # Source
 //! Textbook drag of a plate; sizes derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const AIR_DRAG: Effect = Effect {
@@ -27,5 +27,11 @@ pub const AIR_DRAG: Effect = Effect {
         default: None,
         about: "drag coefficient C_d",
     }],
-    action: Action::Robot(|p, robot| robot.extensions.drag += p[0]),
+    places: &[Place::Air],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("drag_coefficient", 1.0)], starts: &[&[1.0], &[4.0]], given: &[] }],
+    },
+    shape: None,
+    action: Action::Robot(|p, robot| robot.extensions.drag[1] += p[0]),
 };

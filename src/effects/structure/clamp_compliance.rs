@@ -10,7 +10,7 @@
 //! # Source
 //! J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const CLAMP_COMPLIANCE: Effect = Effect {
@@ -27,5 +27,11 @@ pub const CLAMP_COMPLIANCE: Effect = Effect {
         default: None,
         about: "turn c of the root per moment",
     }],
+    places: &[Place::Clamp],
+    fitting: Fitting::Candidate {
+        on: fits::clamped,
+        forms: &[Form { fitted: &[("compliance_rad_per_n_m", 0.5)], starts: &[&[0.2], &[1.0]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.clamp_compliance += 1e-7 * p[0]),
 };

@@ -10,7 +10,7 @@
 //! # Source
 //! Symptoms: Worden and Tomlinson, Nonlinearity in Structural Dynamics, 2001; Kerschen et al. 2006.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const DRY_FRICTION: Effect = Effect {
@@ -27,5 +27,11 @@ pub const DRY_FRICTION: Effect = Effect {
         default: None,
         about: "the moment τ_c in every joint",
     }],
+    places: &[Place::JointMomentOfRate, Place::JointMemory],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("moment_mn_m", 0.1)], starts: &[&[0.05], &[0.3]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.dry_friction += 1e4 * p[0]),
 };

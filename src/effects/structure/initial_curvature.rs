@@ -11,7 +11,7 @@
 //! # Source
 //! Cure temperature: Smart Material FAQ; equation derived.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const INITIAL_CURVATURE: Effect = Effect {
@@ -38,6 +38,12 @@ pub const INITIAL_CURVATURE: Effect = Effect {
             about: "the actuator, from 1; 0: all of them",
         },
     ],
+    places: &[Place::RestShape],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("curvature_per_m", 0.2)], starts: &[&[0.1]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| {
         let curvature = &mut robot.extensions.rest_curvature;
         curvature.resize(robot.actuators, 0.0);

@@ -10,7 +10,7 @@
 //! # Source
 //! Tan and Erturk, doi:10.1117/12.2301000; cubic form from general knowledge.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const STIFFNESS_SOFTENING: Effect = Effect {
@@ -27,5 +27,11 @@ pub const STIFFNESS_SOFTENING: Effect = Effect {
         default: None,
         about: "the factor a",
     }],
+    places: &[Place::JointMomentOfDeviation],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("softening_mm2", 500.0)], starts: &[&[500.0], &[-300.0]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| robot.extensions.softening += 0.01 * p[0]),
 };

@@ -10,7 +10,7 @@
 //! # Source
 //! Derived: a ladder of relaxations with log-uniform times.
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 
 /// See the file's head.
 pub const STRUCTURAL_DAMPING: Effect = Effect {
@@ -27,5 +27,11 @@ pub const STRUCTURAL_DAMPING: Effect = Effect {
         default: None,
         about: "loss factor η_h; the damping ratio is half of it",
     }],
-    action: Action::Robot(|p, robot| robot.extensions.loss += p[0] / 0.68),
+    places: &[Place::JointMemory, Place::JointMomentOfRate],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("loss_factor", 0.02)], starts: &[&[0.02]], given: &[] }],
+    },
+    shape: None,
+    action: Action::Robot(|p, robot| robot.extensions.loss.iter_mut().for_each(|share| *share += p[0] / 0.68)),
 };

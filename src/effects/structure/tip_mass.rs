@@ -11,7 +11,7 @@
 //! # Source
 //! Derived (Rayleigh quotient).
 
-use crate::effects::{Action, Effect, Kind, Parameter};
+use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits};
 use crate::model::PointMass;
 
 /// See the file's head.
@@ -32,6 +32,12 @@ pub const TIP_MASS: Effect = Effect {
             about: "distance from the left end along the sheet; by default the right end",
         },
     ],
+    places: &[Place::Mass],
+    fitting: Fitting::Candidate {
+        on: fits::any,
+        forms: &[Form { fitted: &[("mass_g", 0.1)], starts: &[&[0.05], &[0.2]], given: &[] }],
+    },
+    shape: None,
     action: Action::Robot(|p, robot| {
         let end = robot.material.actuator_length * robot.actuators as f64;
         robot.extensions.point_masses.push(PointMass { mass: p[0], position: (0.1 * p[1]).min(end) });

@@ -3,21 +3,24 @@
 use super::add;
 use crate::bullet::{LinkState, Wrench};
 use crate::engine::GAUSS;
-use crate::model::{AIR_DENSITY, Robot};
+use crate::model::{Extensions, Robot};
 
-/// Drag of every body: `f = −½·ρ·C_d·w·v·|v|` per length, v normal to the body.
+/// Drag of every body: `f = −½·ρ·w·v·(C₁ v₀ + C₂ |v| + C₃ v²/v₀)` per length, v normal to the body.
 pub(super) struct Air {
-    /// ½ ρ C_d w (g/cm²).
-    drag: f64,
+    extensions: Extensions,
+    width: f64,
     half_lengths: Vec<f64>,
 }
 
 impl Air {
     /// `None` without drag.
     pub(super) fn new(robot: &Robot) -> Option<Self> {
-        let drag = 0.5 * AIR_DENSITY * robot.extensions.drag * robot.material.width;
         let half_lengths = robot.segments().iter().map(|segment| 0.5 * segment.length).collect();
-        (drag != 0.0).then_some(Self { drag, half_lengths })
+        robot.extensions.has_drag().then(|| Self {
+            extensions: robot.extensions.clone(),
+            width: robot.material.width,
+            half_lengths,
+        })
     }
 
     /// Adds the drag on boxes with these motions to `wrenches`.
@@ -31,7 +34,7 @@ impl Air {
                 let arm = at * half;
                 // A positive turn lowers the far end.
                 let speed = dot(body.velocity, normal) - arm * dot(body.angular_velocity, across);
-                let part = -self.drag * weight * half * speed * speed.abs();
+                let part = -self.extensions.drag_per_speed(self.width, speed) * weight * half * speed;
                 force += part;
                 moment -= arm * part;
             }

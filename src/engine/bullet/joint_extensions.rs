@@ -1,7 +1,7 @@
 //! Joint torques beyond eq. 1.
 
 use crate::actuator::PiezoJoint;
-use crate::model::{Extensions, LOSS_TIMES, Robot};
+use crate::model::{Extensions, LOSS_TIMES, Robot, Slip};
 
 /// Joint torques beyond eq. 1. Like the torque law they act with the state at a step's start.
 pub(super) struct JointExtensions {
@@ -10,8 +10,10 @@ pub(super) struct JointExtensions {
     /// Rest angle at 0 V of each joint (rad), and factor on its voltage.
     rest_angles: Vec<f64>,
     gains: Vec<f64>,
-    /// q_j of each joint's Prony chain (rad).
-    pub(super) loss: Vec<[f64; LOSS_TIMES.len()]>,
+    /// Memory of each joint, joints × states: q_j of its Prony chain, then the elastic angles of its springs with a limit (rad).
+    pub(super) memory: Vec<f64>,
+    /// Number of a joint's states.
+    states: usize,
     /// Largest elastic angle so far (rad), if joints harden with it.
     pub(super) largest: f64,
 }
@@ -24,12 +26,14 @@ impl JointExtensions {
             return None;
         }
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);
+        let chain = if e.has_loss() { LOSS_TIMES.len() } else { 0 };
         let of_joint = |i: usize| e.rest_curvature.get(i / m).map_or(0.0, |curvature| curvature * robot.link_length());
         Some(Self {
             link: robot.link_length(),
             rest_angles: (0..joints).map(of_joint).collect(),
             gains: (0..joints).map(|i| e.joint_gains.get(i).copied().unwrap_or(1.0)).collect(),
-            loss: if e.loss == 0.0 { Vec::new() } else { vec![[0.0; LOSS_TIMES.len()]; joints] },
+            memory: vec![0.0; joints * (chain + e.slips.len())],
+            states: chain + e.slips.len(),
             largest: 0.0,
             extensions: e.clone(),
         })
@@ -43,16 +47,30 @@ impl JointExtensions {
         if self.extensions.softening < 0.0 {
             self.largest = self.largest.max(delta.abs());
         }
-        let stored: f64 = self.loss.get(i).map_or(0.0, |chain| chain.iter().sum());
+        let own = &self.memory[i * self.states..(i + 1) * self.states];
+        let (chain, slips) = own.split_at(self.states - self.extensions.slips.len());
+        let stored: f64 = chain.iter().zip(&self.extensions.loss).map(|(q, share)| share * q).sum();
+        let of = |(elastic, slip): (&f64, &Slip)| slip.moment * elastic / (slip.curvature * self.link);
+        let slipping: f64 = slips.iter().zip(&self.extensions.slips).map(of).sum();
         joint.torque(angle, rate, *voltage) + self.extensions.torque(joint.stiffness, self.link, delta, rate)
-            - joint.stiffness * self.extensions.loss * stored
+            - joint.stiffness * stored
+            - slipping
     }
 
-    /// Advances the Prony chains by a step of `dt` (s) at the joints' rates (rad/s).
+    /// Advances the joints' memory by a step of `dt` (s) at their rates (rad/s).
     pub(super) fn advance(&mut self, rates: &[f64], dt: f64) {
-        for (chain, rate) in self.loss.iter_mut().zip(rates) {
+        if self.states == 0 {
+            return;
+        }
+        let count = self.states - self.extensions.slips.len();
+        for (own, rate) in self.memory.chunks_exact_mut(self.states).zip(rates) {
+            let (chain, slips) = own.split_at_mut(count);
             for (q, time) in chain.iter_mut().zip(LOSS_TIMES) {
                 *q += dt * (rate - *q / time);
+            }
+            for (elastic, slip) in slips.iter_mut().zip(&self.extensions.slips) {
+                let limit = slip.curvature * self.link;
+                *elastic = (*elastic + dt * rate).clamp(-limit, limit);
             }
         }
     }

@@ -1,8 +1,9 @@
-//! Joint torques beyond eq. 1 (softening, dry friction, a generalised Maxwell or Prony chain), and drag in air.
+//! Joint torques beyond eq. 1 (softening, dry friction, curves of deviation and rate, springs with a limit, a generalised Maxwell or Prony chain),
+//! and drag in air.
 //!
 //! The step stays one problem that is linear in the mean rates u: a joint's extra torque e is put as e* − s (u − u*), about the rate u* of the
-//! step before. For softening s is the tangent, which errs by the square of what changes in a step. For dry friction, τ_c tanh(u/ω), the step
-//! is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
+//! step before. For softening, curves of the deviation and springs with a limit s is the tangent, which errs by the square of what changes in a step.
+//! For dry friction, τ_c tanh(u/ω), and curves of the rate the step is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
 //! with the secant −e*/u*, whose quadratic potential majorises that of friction, so that a repetition can only lower the cost. The Prony chain is linear and
 //! exact over a step.
 
@@ -11,7 +12,7 @@ use wide::f64x2;
 use super::lanes::Lanes;
 use super::quad::Quad;
 use crate::engine::GAUSS;
-use crate::model::{AIR_DENSITY, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
+use crate::model::{DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
 
 /// Repetitions end when no friction torque changes by more than this fraction of its moment; after `LARGEST_REPETITIONS` they fail.
 const FRICTION_ENOUGH: f64 = 1e-3;
@@ -22,15 +23,17 @@ pub(super) const LARGEST_REPETITIONS: u32 = 200;
 /// Extra torques of one robot, with their memory.
 #[derive(Debug, Clone)]
 pub(super) struct JointExtensions {
+    extensions: Extensions,
+    /// Length of sheet that a joint stands for (cm).
+    link: f64,
     softening: f64,
+    /// Largest moment of friction and of the curve of the rate (dyn·cm).
     friction: f64,
-    /// ξ.
-    loss: f64,
     /// Per unit of the Prony chain: remainder after a step, gain per rate, and the means of both over the step.
     prony: [[f64; 4]; LOSS_TIMES.len()],
     half_step: f64,
-    /// ½ ρ C_d w (g/cm²).
-    drag: f64,
+    /// Width of the sheet (cm).
+    width: f64,
     /// Implicit terms of the plain joints.
     implicit: Vec<Lanes>,
     /// Torque terms of the plain joints in this step.
@@ -43,12 +46,14 @@ pub(super) struct JointExtensions {
     turned_back: Vec<[bool; 4]>,
     /// q_j of the Prony chain (rad).
     memory: Vec<[Lanes; LOSS_TIMES.len()]>,
+    /// Elastic angles of the springs with a limit (rad), quads × springs.
+    slips: Vec<Lanes>,
 }
 
 impl JointExtensions {
     /// `None` for the plain model.
     pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Self> {
-        if !extensions.bends_torque_law() && extensions.drag == 0.0 {
+        if !extensions.bends_torque_law() && !extensions.has_drag() {
             return None;
         }
         let count = quads.len();
@@ -59,23 +64,25 @@ impl JointExtensions {
         });
         Some(Self {
             softening: extensions.softening / (link * link),
-            friction: extensions.dry_friction,
-            loss: extensions.loss,
+            friction: extensions.dry_friction + extensions.moment_of_rate.largest(),
             prony: prony(step),
             half_step: 0.5 * step,
-            drag: 0.5 * AIR_DENSITY * extensions.drag * width,
+            width,
             implicit: quads.iter().map(|quad| quad.implicit).collect(),
             torque: vec![Lanes::ZERO; count],
             joint: joint.collect(),
             rates: vec![Lanes::ZERO; count],
             turned_back: vec![[false; 4]; count],
             memory: vec![Default::default(); count],
+            slips: vec![Lanes::ZERO; count * extensions.slips.len()],
+            extensions: extensions.clone(),
+            link,
         })
     }
 
     pub(super) fn set_time_step(&mut self, step: f64, quads: &[Quad]) {
         self.half_step = 0.5 * step;
-        if self.loss != 0.0 {
+        if self.extensions.has_loss() {
             self.prony = prony(step);
         }
         self.implicit.iter_mut().zip(quads).for_each(|(implicit, quad)| *implicit = quad.implicit);
@@ -85,25 +92,69 @@ impl JointExtensions {
         self.friction != 0.0
     }
 
-    /// Elastic torque of softening and its slope, at the elastic angle δ.
-    fn softened(&self, stiffness: Lanes, delta: Lanes) -> (Lanes, Lanes) {
-        let most = 1.0 - LEAST_STIFFNESS;
-        let share = |delta: f64| self.softening * delta * delta;
-        let torque = delta.map(|delta| share(delta).min(most) * delta);
-        let slope = delta.map(|delta| if share(delta) < most { 3.0 * share(delta) } else { most });
-        (stiffness * torque, stiffness * slope)
+    /// Whether the torque depends on the elastic deviation alone.
+    fn is_elastic(&self) -> bool {
+        self.softening != 0.0 || !self.extensions.moment_of_curvature.is_zero()
+    }
+
+    /// Elastic torque of softening and of the curve of the deviation, and its slope, at the elastic angle δ of quad `k`.
+    fn elastic(&self, k: usize, quad: &Quad, delta: Lanes) -> (Lanes, Lanes) {
+        let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
+        if self.softening != 0.0 {
+            let most = 1.0 - LEAST_STIFFNESS;
+            let share = |delta: f64| self.softening * delta * delta;
+            let stiffness = self.joint[k] * quad.stiffness;
+            torque = stiffness * delta.map(|delta| share(delta).min(most) * delta);
+            slope = stiffness * delta.map(|delta| if share(delta) < most { 3.0 * share(delta) } else { most });
+        }
+        let curve = &self.extensions.moment_of_curvature;
+        if !curve.is_zero() {
+            // Joints that point to the left turn the other way.
+            let of: [[f64; 2]; 4] = std::array::from_fn(|lane| {
+                let sign = sense(lane);
+                let [moment, tangent] = curve.at(sign * delta.lane(lane) / self.link);
+                [sign * moment, tangent / self.link]
+            });
+            torque += -(self.joint[k] * Lanes::new(of.map(|[moment, _]| moment)));
+            slope += -(self.joint[k] * Lanes::new(of.map(|[_, tangent]| tangent)));
+        }
+        (torque, slope)
     }
 
     /// Extra torques (dyn·cm) of joints at rest, for statics, in the sense of rotation from the root outwards.
     pub(super) fn at_rest(&self, k: usize, quad: &Quad, delta: Lanes) -> Lanes {
-        if self.softening == 0.0 { Lanes::ZERO } else { self.softened(self.joint[k] * quad.stiffness, delta).0 }
+        if self.is_elastic() { self.elastic(k, quad, delta).0 } else { Lanes::ZERO }
     }
 
     /// Extra torques (dyn·cm) at elastic angle (rad) and rate (rad/s), for records, in the same sense.
     pub(super) fn now(&self, k: usize, quad: &Quad, delta: Lanes, rate: Lanes) -> Lanes {
-        let friction = rate.map(|rate| self.friction * (rate / DRY_FRICTION_RATE).tanh());
-        let stored = self.memory[k].iter().fold(Lanes::ZERO, |sum, q| sum + *q);
-        self.at_rest(k, quad, delta) - self.joint[k] * friction - quad.stiffness * Lanes::splat(self.loss) * stored
+        let friction = self.resisting(rate).0;
+        let stored = self.memory[k].iter().zip(&self.extensions.loss);
+        let stored = stored.fold(Lanes::ZERO, |sum, (q, share)| sum + Lanes::splat(*share) * *q);
+        let slips = self.slips_of(k).fold(Lanes::ZERO, |sum, (elastic, [per_angle, _])| sum + Lanes::splat(per_angle) * *elastic);
+        self.at_rest(k, quad, delta) - self.joint[k] * (friction + slips) - quad.stiffness * stored
+    }
+
+    /// Moment against the rates of four joints, and its derivative.
+    fn resisting(&self, rate: Lanes) -> (Lanes, Lanes) {
+        let of: [[f64; 2]; 4] = std::array::from_fn(|lane| self.resistance(lane, rate.lane(lane)));
+        (Lanes::new(of.map(|[moment, _]| moment)), Lanes::new(of.map(|[_, slope]| slope)))
+    }
+
+    /// Moment against the rate (rad/s) of the joint in a lane, and its derivative.
+    fn resistance(&self, lane: usize, rate: f64) -> [f64; 2] {
+        let [moment, slope] = self.extensions.friction(self.link, sense(lane) * rate);
+        [sense(lane) * moment, slope]
+    }
+
+    /// Elastic angles of the springs with a limit of quad `k`, each with its stiffness (dyn·cm/rad) and its limit (rad).
+    fn slips_of(&self, k: usize) -> impl Iterator<Item = (&Lanes, [f64; 2])> {
+        let slips = &self.extensions.slips;
+        let own = &self.slips[k * slips.len()..(k + 1) * slips.len()];
+        own.iter().zip(slips).map(|(elastic, slip)| {
+            let limit = slip.curvature * self.link;
+            (elastic, [slip.moment / limit, limit])
+        })
     }
 
     /// Begins a step: stores the plain model's torques.
@@ -114,16 +165,13 @@ impl JointExtensions {
         self.turned_back.fill([false; 4]);
     }
 
-    /// Slope s and constant part e* + s u* of friction about the rate `u` of a joint.
-    fn friction(&self, u: f64, turned_back: bool) -> (f64, f64) {
-        let ratio = u / DRY_FRICTION_RATE;
-        let share = ratio.tanh();
-        if ratio.abs() > FAST && !turned_back {
-            let slope = self.friction / DRY_FRICTION_RATE * (1.0 - share * share);
-            (slope, slope * u - self.friction * share)
+    /// Slope s and constant part e* + s u* of friction about the rate `u` of the joint in a lane.
+    fn friction(&self, lane: usize, u: f64, turned_back: bool) -> (f64, f64) {
+        let [moment, slope] = self.resistance(lane, u);
+        if u.abs() > FAST * DRY_FRICTION_RATE && !turned_back {
+            (slope, slope * u - moment)
         } else {
-            let secant = if ratio.abs() < 1e-6 { 1.0 } else { share / ratio };
-            (self.friction / DRY_FRICTION_RATE * secant, 0.0)
+            (if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0)
         }
     }
 
@@ -136,20 +184,26 @@ impl JointExtensions {
             let (rate, joint) = (self.rates[k], self.joint[k]);
             let stiffness = joint * quad.stiffness;
             let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
-            if self.softening != 0.0 {
+            if self.is_elastic() {
                 let delta = quad.angle - quad.angle.inner(before) - quad.rest_angle;
-                let (soft, tangent) = self.softened(stiffness, delta + half * rate);
-                torque += soft - half * tangent * rate;
+                let (elastic, tangent) = self.elastic(k, quad, delta + half * rate);
+                torque += elastic - half * tangent * rate;
                 slope += -(half * tangent);
             }
+            for (elastic, [per_angle, limit]) in self.slips_of(k) {
+                let middle = *elastic + half * rate;
+                let held = middle.map(|angle| if angle.abs() < limit { per_angle } else { 0.0 });
+                torque += joint * (half * held * rate - Lanes::splat(per_angle) * middle.map(|angle| angle.clamp(-limit, limit)));
+                slope += joint * (half * held);
+            }
             if self.friction != 0.0 {
-                let of: [_; 4] = std::array::from_fn(|lane| self.friction(rate.lane(lane), self.turned_back[k][lane]));
+                let of: [_; 4] = std::array::from_fn(|lane| self.friction(lane, rate.lane(lane), self.turned_back[k][lane]));
                 slope += joint * Lanes::new(of.map(|(slope, _)| slope));
                 torque += joint * Lanes::new(of.map(|(_, rest)| rest));
             }
-            if self.loss != 0.0 {
-                let stiffness = stiffness * Lanes::splat(self.loss);
-                for ([_, _, kept, added], q) in self.prony.iter().zip(&self.memory[k]) {
+            if self.extensions.has_loss() {
+                for (([_, _, kept, added], q), share) in self.prony.iter().zip(&self.memory[k]).zip(&self.extensions.loss) {
+                    let stiffness = stiffness * Lanes::splat(*share);
                     torque += -(stiffness * Lanes::splat(*kept) * *q);
                     slope += stiffness * Lanes::splat(*added);
                 }
@@ -170,9 +224,9 @@ impl JointExtensions {
             if self.friction != 0.0 {
                 for lane in 0..4 {
                     let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
-                    let (slope, rest) = self.friction(before, self.turned_back[k][lane]);
+                    let (slope, rest) = self.friction(lane, before, self.turned_back[k][lane]);
                     let put = slope * now - rest;
-                    changed = changed.max((put / self.friction - (now / DRY_FRICTION_RATE).tanh()).abs());
+                    changed = changed.max((put - self.resistance(lane, now)[0]).abs() / self.friction);
                     self.turned_back[k][lane] |= now * before < 0.0;
                 }
             }
@@ -181,14 +235,21 @@ impl JointExtensions {
         changed <= FRICTION_ENOUGH
     }
 
-    /// Ends a step: advances the Prony chain.
+    /// Ends a step: advances the memory.
     pub(super) fn end(&mut self) {
-        if self.loss == 0.0 {
-            return;
+        if self.extensions.has_loss() {
+            for (memory, rate) in self.memory.iter_mut().zip(&self.rates) {
+                for (q, [left, added, ..]) in memory.iter_mut().zip(&self.prony) {
+                    *q = Lanes::splat(*left) * *q + Lanes::splat(*added) * *rate;
+                }
+            }
         }
-        for (memory, rate) in self.memory.iter_mut().zip(&self.rates) {
-            for (q, [left, added, ..]) in memory.iter_mut().zip(&self.prony) {
-                *q = Lanes::splat(*left) * *q + Lanes::splat(*added) * *rate;
+        let slips = &self.extensions.slips;
+        let step = Lanes::splat(2.0 * self.half_step);
+        for (own, rate) in self.slips.chunks_exact_mut(slips.len().max(1)).zip(&self.rates) {
+            for (elastic, slip) in own.iter_mut().zip(slips) {
+                let limit = slip.curvature * self.link;
+                *elastic = (*elastic + step * *rate).map(|angle| angle.clamp(-limit, limit));
             }
         }
     }
@@ -202,7 +263,8 @@ impl JointExtensions {
         for (at, weight) in GAUSS {
             let arm = (Lanes::splat(0.5 + 0.5 * at) - quad.middle) * quad.reach;
             let speed = speed + rate * arm;
-            let part = Lanes::splat(-0.5 * weight * self.drag) * quad.reach.abs() * speed * speed.abs();
+            let per_speed = speed.map(|speed| self.extensions.drag_per_speed(self.width, speed));
+            let part = Lanes::splat(-0.5 * weight) * per_speed * quad.reach.abs() * speed;
             force += part;
             moment += part * arm;
         }
@@ -210,17 +272,17 @@ impl JointExtensions {
     }
 
     pub(super) fn has_drag(&self) -> bool {
-        self.drag != 0.0
+        self.extensions.has_drag()
     }
 
     /// Rates and memory as numbers for storing.
     pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
         let memory = self.memory.iter().flatten();
-        self.rates.iter().chain(memory).flat_map(|lanes| lanes.to_array())
+        self.rates.iter().chain(memory).chain(&self.slips).flat_map(|lanes| lanes.to_array())
     }
 
     pub(super) fn restore(&mut self, saved: &[f64]) {
-        let slots = self.rates.iter_mut().chain(self.memory.iter_mut().flatten());
+        let slots = self.rates.iter_mut().chain(self.memory.iter_mut().flatten()).chain(&mut self.slips);
         for (slot, values) in slots.zip(saved.as_chunks().0) {
             *slot = Lanes::new(*values);
         }
@@ -234,4 +296,9 @@ fn prony(step: f64) -> [[f64; 4]; LOSS_TIMES.len()] {
         let mean = gone * time / step;
         [1.0 - gone, time * gone, mean, time * (1.0 - mean)]
     })
+}
+
+/// The sign of a joint's angle in a lane: angles count outwards from the root, and on the right arm that is the opposite sense.
+fn sense(lane: usize) -> f64 {
+    if lane % 2 == 0 { 1.0 } else { -1.0 }
 }

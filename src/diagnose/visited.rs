@@ -1,0 +1,98 @@
+//! The ranges of voltage, curvature and rate that the data visit: free forms are curves over them.
+
+use rayon::prelude::*;
+
+use super::dataset::Start;
+use super::track::put;
+use crate::drive::{Drive, Means, Table, Waveform};
+use crate::effects::Effect;
+use crate::engine::{Engine, EngineError, PlanarEngine};
+use crate::model::Robot;
+
+/// A range that is not visited is taken for this (1/m, 1/(m·s)).
+const LEAST: f64 = 1e-3;
+
+/// What the data visit.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Visited {
+    /// Lowest voltage, 0 at most, and highest, 0 at least (V).
+    pub(super) volts: [f64; 2],
+    /// Largest elastic curvature of the nominal robot (1/m).
+    pub(super) curvature: f64,
+    /// Largest rate of curvature of the nominal robot (1/(m·s)).
+    pub(super) rate: f64,
+}
+
+impl Visited {
+    /// Nothing: without free forms.
+    pub(super) const NOTHING: Self = Self { volts: [0.0; 2], curvature: LEAST, rate: LEAST };
+
+    /// The range of a free form by the name of its parameter; none of other parameters.
+    pub(super) fn given(&self, name: &str) -> Option<f64> {
+        match name {
+            "low_v" => Some(self.volts[0]),
+            "high_v" => Some(self.volts[1]),
+            "span_v" => Some((self.volts[1] - self.volts[0]).max(1.0)),
+            "low_per_m" => Some(-self.curvature),
+            "high_per_m" | "range_per_m" => Some(self.curvature),
+            "range_per_m_s" => Some(self.rate),
+            _ => None,
+        }
+    }
+
+    /// True if the data do not reach the side of a curve that the parameter `name` belongs to.
+    pub(super) fn is_beyond(&self, effect: &Effect, name: &str) -> bool {
+        let has = |range: &str| effect.parameters.iter().any(|p| p.name == range);
+        has("low_v")
+            && ((name.starts_with("below") && self.volts[0] == 0.0) || (name.starts_with("above") && self.volts[1] == 0.0))
+    }
+}
+
+/// A run of the nominal model.
+pub(super) struct Visit<'a> {
+    pub robot: &'a Robot,
+    pub start: &'a Start,
+    pub drive: Table,
+    /// Time step (s).
+    pub step: f64,
+    /// Number of steps.
+    pub steps: u64,
+}
+
+/// What `runs` visit.
+///
+/// # Errors
+/// [`EngineError`] if a run cannot be simulated.
+pub(super) fn visited(runs: &[Visit]) -> Result<Visited, EngineError> {
+    let mut volts = [0.0_f64; 2];
+    for v in runs.iter().flat_map(|run| run.drive.volts()) {
+        volts = [volts[0].min(*v), volts[1].max(*v)];
+    }
+    let largest = runs.par_iter().map(extremes).collect::<Result<Vec<_>, _>>()?;
+    let [curvature, rate] = largest.iter().fold([LEAST; 2], |a, b| [a[0].max(100.0 * b[0]), a[1].max(100.0 * b[1])]);
+    Ok(Visited { volts, curvature, rate })
+}
+
+/// Largest elastic curvature of a joint (1/cm) and largest rate of curvature (1/(cm·s)) in a run.
+fn extremes(run: &Visit) -> Result<[f64; 2], EngineError> {
+    let Visit { robot, start, drive, step: h, steps } = run;
+    let h = *h;
+    let drive = Drive { waveform: Waveform::Table(drive.clone()), positive_gain: 1.0, delay: 0.0 };
+    let mut engine = PlanarEngine::new(robot, h)?;
+    let mut means = Means::new(&drive, robot.actuators, 0.0);
+    let mut volts = vec![0.0; robot.actuators];
+    drive.voltages(0.0, &mut volts);
+    put(&mut engine, robot, h, start, &volts)?;
+    let (link, per_volt) = (robot.link_length(), robot.joint().rest_angle_per_volt);
+    let mut largest = [0.0_f64; 2];
+    for step in 0..*steps {
+        means.over(step as f64 * h, (step + 1) as f64 * h, &mut volts);
+        engine.prepare(&volts)?;
+        engine.advance()?;
+        let joints = engine.joints();
+        for ((angle, rate), volts) in joints.angles.iter().zip(&joints.rates).zip(&joints.motor_voltages) {
+            largest = [largest[0].max((angle - per_volt * volts).abs() / link), largest[1].max(rate.abs() / link)];
+        }
+    }
+    Ok(largest)
+}
