@@ -77,6 +77,8 @@ impl Oscillator {
             id,
             kind: if is_constant { "calibration" } else { "structure" },
             cause,
+            places: vec![id],
+            is_free_form: false,
             is_constant,
             parameters: vec![Free { name, unit: "", off: Some(off), bounds, scale, inverse: false }],
             fixed: Vec::new(),

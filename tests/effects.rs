@@ -318,3 +318,74 @@ fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     let rest = experiment::run(&experiment, second.as_mut(), |_| Control::Continue).unwrap();
     assert_eq!(tip(&rest).to_bits(), tip(&full).to_bits());
 }
+
+/// Largest distance between the right ends of two runs (cm).
+fn apart(a: &Run, b: &Run) -> f64 {
+    let (a, b) = (&a.recording, &b.recording);
+    let of = |k: usize| (a.node(k, a.nodes() - 1)[2] - b.node(k, b.nodes() - 1)[2]).abs();
+    assert_eq!(a.len(), b.len());
+    (0..a.len()).map(of).fold(0.0, f64::max)
+}
+
+#[test]
+fn free_forms_hold_the_named_laws_of_their_places() {
+    let with_all = |effects: &[(&str, &[(&str, f64)])]| {
+        let text = effects.iter().fold(CANTILEVER.to_owned(), |text, (id, values)| with(&text, id, values));
+        run(&text, &[])
+    };
+    type Effects<'a> = &'a [(&'a str, &'a [(&'a str, f64)])];
+    let fifths = |of: &dyn Fn(f64) -> f64| [1, 2, 3, 4, 5].map(|k| of(0.2 * f64::from(k)));
+    // A tenth more than the voltage.
+    let [a, b, c, d, e] = fifths(&|share| -100.0 * share);
+    let line = [
+        ("low_v", -1000.0),
+        ("high_v", 0.0),
+        ("below_1_v", a),
+        ("below_2_v", b),
+        ("below_3_v", c),
+        ("below_4_v", d),
+        ("below_5_v", e),
+    ];
+    let cases: [(Effects, Effects); 6] = [
+        (
+            &[(
+                "free-joint-memory",
+                &[("share_1", 0.05), ("share_2", 0.05), ("share_3", 0.05), ("share_4", 0.05), ("share_5", 0.05)],
+            )],
+            &[("structural-damping", &[("loss_factor", 0.05 * 0.68)])],
+        ),
+        (&[("free-drag", &[("quadratic", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0)])]),
+        (&[("free-mass", &[("mass_4_g", 0.2)])], &[("tip-mass", &[("mass_g", 0.2)])]),
+        (&[("free-drive-filter", &[("share_3", 1.0)])], &[("driver-lag", &[("time_constant_s", 3e-3)])]),
+        // (1 − w) V + w q = (1 − w) (V + w/(1 − w) q).
+        (
+            &[("free-voltage-memory", &[("share_3", 0.2)])],
+            &[
+                ("creep", &[("per_decade", 0.25), ("rungs_per_decade", 0.0), ("fastest_s", 0.1)]),
+                ("actuation-gain", &[("scale", 0.8)]),
+            ],
+        ),
+        (&[("free-voltage-curve", &line)], &[("actuation-gain", &[("scale", 1.1)])]),
+    ];
+    for (free, named) in cases {
+        let (free_run, plain) = (with_all(free), run(CANTILEVER, &[]));
+        let (error, change) = (apart(&free_run, &with_all(named)), apart(&free_run, &plain));
+        // Two ways to the same numbers: rounding only.
+        assert!(change > 1e-3 && error < 1e-9, "{free:?}: {error:e} cm of {change}");
+    }
+}
+
+#[test]
+fn springs_with_a_limit_take_the_work_of_their_loop() {
+    // Let go from flat, a sheet without viscous loss rings about its sag; slipping springs take the work of their loops.
+    let ring = "[robot]\nactuators = 1\nmount = \"clamped\"\ndamping_eta = 0.0\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0]\n[simulation]\n\
+        engine = \"planar\"\nnumerical_damping_per_s = 0\ntime_step_s = 1e-4\nduration_s = 1.0\nrecord_every_s = 1e-3\n";
+    let swing = |run: &Run| {
+        let r = &run.recording;
+        let z: Vec<f64> = (r.len() - 200..r.len()).map(|k| r.node(k, r.nodes() - 1)[2]).collect();
+        z.iter().fold(f64::MIN, |a, b| a.max(*b)) - z.iter().fold(f64::MAX, |a, b| a.min(*b))
+    };
+    let (free, held) =
+        (run(ring, &[]), run(&with(ring, "free-joint-slip", &[("range_per_m", 0.1), ("moment_5_mn_m", 0.1)]), &[]));
+    assert!(swing(&held) < 0.5 * swing(&free), "{} of {}", swing(&held), swing(&free));
+}

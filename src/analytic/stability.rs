@@ -347,7 +347,7 @@ mod tests {
             ("mass", Extensions { mass_scale: 0.25, ..base.clone() }),
             ("tip mass", Extensions { point_masses: vec![PointMass { mass: 5.0, position: 9.0 }], ..base.clone() }),
             ("dry friction", Extensions { dry_friction: 100.0, ..base.clone() }),
-            ("loss", Extensions { loss: 0.2, ..base.clone() }),
+            ("loss", Extensions { loss: [0.2; LOSS_TIMES.len()], ..base.clone() }),
             ("clamp", Extensions { clamp_compliance: 1e-6, ..base }),
         ];
         for (name, extensions) in cases {

@@ -56,7 +56,8 @@ fn push(all: &mut Vec<Candidate>, effect: &'static Effect, form: &'static Form, 
         .collect();
     let ranges = effect.parameters.iter().filter_map(|p| Some((p.name, visited.given(p.name)?)));
     let given: Vec<(&'static str, f64)> = if effect.shape.is_some() { ranges.collect() } else { form.given.to_vec() };
-    let is_of_one_actuator = effect.parameters.iter().any(|p| p.name == "actuator") && fitted("actuator").is_none();
+    let is_of_one_actuator =
+        effect.parameters.iter().any(|p| p.name == "actuator" && p.default.is_none()) && fitted("actuator").is_none();
     let actuators = if is_of_one_actuator { 1..=bench.actuators } else { 0..=0 };
     for actuator in actuators {
         let which = (actuator > 0).then_some(("actuator", actuator as f64));
@@ -71,5 +72,58 @@ fn push(all: &mut Vec<Candidate>, effect: &'static Effect, form: &'static Form, 
             fixed: given.iter().copied().chain(which).collect(),
             starts: starts.clone(),
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Place;
+
+    const BENCH: Bench = Bench { is_clamped: true, is_on_floor: true, actuators: 5, markers: 3 };
+    const VISITED: Visited = Visited { volts: [-1500.0, 400.0], curvature: 5.0, rate: 300.0 };
+
+    #[test]
+    fn every_effect_is_a_candidate_or_excluded_for_a_reason() {
+        let all = candidates(&BENCH, &VISITED);
+        for effect in EFFECTS {
+            let own: Vec<&Candidate> = all.iter().filter(|c| c.id == effect.id).collect();
+            match &effect.fitting {
+                Fitting::Excluded(reason) => assert!(own.is_empty() && !reason.is_empty(), "{}", effect.id),
+                Fitting::Candidate { forms, .. } => assert!(own.len() >= forms.len(), "{}", effect.id),
+            }
+            for c in own {
+                assert!(!c.starts.is_empty() && c.parameters.iter().all(|p| p.scale > 0.0), "{}", c.id);
+                assert!(c.starts.iter().all(|start| start.len() == c.parameters.len()), "{}", c.id);
+                let known = |name: &str| effect.parameters.iter().any(|p| p.name == name);
+                assert!(c.fixed.iter().all(|(name, _)| known(name)), "{}: {:?}", c.id, c.fixed);
+                for (p, x) in c.starts.iter().flat_map(|start| c.parameters.iter().zip(start)) {
+                    assert!((p.bounds[0]..=p.bounds[1]).contains(x), "{} starts with {} = {x}", c.id, p.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_form_lists_parameters_of_its_effect_and_every_free_form_has_a_named_rival() {
+        for effect in EFFECTS {
+            let Fitting::Candidate { forms, .. } = &effect.fitting else { continue };
+            for (name, _) in forms.iter().flat_map(|form| form.fitted) {
+                assert!(effect.parameters.iter().any(|p| p.name == *name), "{}: {name}", effect.id);
+            }
+            let is_rival = |other: &&&Effect| other.shape.is_none() && other.places.contains(&effect.places[0]);
+            assert!(effect.shape.is_none() || EFFECTS.iter().any(|other| is_rival(&other)), "{}", effect.id);
+            assert!(effect.places.iter().all(|place| Place::ALL.contains(place)), "{}", effect.id);
+        }
+    }
+
+    #[test]
+    fn a_side_of_a_curve_that_no_voltage_reaches_is_not_fitted() {
+        let one_sided = Visited { volts: [-1500.0, 0.0], ..VISITED };
+        let of = |visited: &Visited| {
+            let all = candidates(&BENCH, visited);
+            all.into_iter().find(|c| c.id == "free-voltage-curve").map(|c| c.parameters.len())
+        };
+        assert_eq!((of(&VISITED), of(&one_sided)), (Some(10), Some(5)));
     }
 }

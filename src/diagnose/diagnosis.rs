@@ -64,7 +64,7 @@ pub struct Adopted {
     pub share: f64,
     /// What it counts for.
     pub role: Part,
-    /// Share of resamples over runs in which it is chosen (0 to 1); none where there are too few runs.
+    /// Share of resamples that leave out one or two runs in which it is chosen, by linear estimates (0 to 1); none with few runs.
     pub stability: Option<f64>,
     /// The curve of a free form.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -40,6 +40,7 @@ mod response;
 pub mod robot;
 mod run_csv;
 pub mod search;
+mod stability;
 mod summary;
 mod track;
 mod visited;

@@ -30,6 +30,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         },
         "creep" => match given("rungs_per_decade") {
             Some(0.0) => "one time constant".into(),
+            Some(1.0) if given("fastest_s").is_some() => "one time constant in a decade, from 10 ms on".into(),
             Some(1.0) => "one time constant in a decade".into(),
             Some(count) => format!("{count} time constants in a decade"),
             None => String::new(),
@@ -160,7 +161,8 @@ pub fn shown(id: &str, estimate: &Estimate, constants: &[(&str, f64, &str)]) -> 
 mod tests {
     use super::*;
     use crate::diagnose::candidates::candidates;
-    use crate::effects::EFFECTS;
+    use crate::diagnose::visited::Visited;
+    use crate::effects::{Bench, EFFECTS};
     use crate::experiment::{self, Source, presets};
 
     fn robot(preset: &str) -> Robot {
@@ -170,7 +172,7 @@ mod tests {
     #[test]
     fn every_form_of_a_cause_has_a_label_of_its_own() {
         for preset in ["cantilever-dc", "static-shape"] {
-            let mut labels: Vec<String> = candidates(&robot(preset), 2)
+            let mut labels: Vec<String> = candidates(&Bench::new(&robot(preset), 2), &Visited::NOTHING)
                 .iter()
                 .map(|c| with_form(c.id, &form(c.id, &c.fixed, c.parameters.iter().map(|p| p.name))))
                 .collect();

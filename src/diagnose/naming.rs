@@ -6,8 +6,8 @@
 
 use super::DiagnoseError;
 use super::diagnosis::Nearest;
-use super::plant::Model;
-use super::search::{Scored, Search};
+use super::plant::{Model, Term};
+use super::search::{PROMISING_IN_PLACE, Scored, Search};
 
 /// A name stands if it takes this share of what the free form takes on held-out runs.
 const LEAST_TAKEN: f64 = 0.95;
@@ -18,8 +18,8 @@ const MOST_NAMES: usize = 5;
 pub struct Naming {
     /// The model.
     pub best: Scored,
-    /// For each term, the names that were tried in the stead of its free form; none for a term that never was one.
-    pub nearest: Vec<Vec<Nearest>>,
+    /// The places of every free form, and the names that were tried in its stead, nearest first.
+    pub nearest: Vec<(Vec<&'static str>, Vec<Nearest>)>,
 }
 
 /// Tries the named causes of every free form's place in its stead.
@@ -28,55 +28,62 @@ pub struct Naming {
 /// [`DiagnoseError`] if a model without one of its terms cannot be simulated.
 pub fn name(search: &mut Search, open: Scored) -> Result<Naming, DiagnoseError> {
     let mut best = open;
-    let mut nearest = vec![Vec::new(); best.model().terms.len()];
-    let mut changed = false;
-    for index in 0..best.model().terms.len() {
-        if !search.candidate(&best.model().terms[index]).is_free_form {
-            continue;
-        }
+    let mut nearest = Vec::new();
+    let frees: Vec<Term> = best.model().terms.iter().filter(|term| search.candidate(term).is_free_form).cloned().collect();
+    for free in &frees {
+        let Some(index) = best.model().terms.iter().position(|term| term.candidate == free.candidate) else { continue };
         let (named, tried) = names(search, &best, index)?;
-        nearest[index] = tried;
-        if let Some(named) = named {
-            best = named;
-            changed = true;
-        }
+        nearest.push((search.candidate(free).places.clone(), tried));
+        best = named.unwrap_or(best);
     }
-    if changed {
+    if !frees.is_empty() {
         best = search.settle(best)?;
     }
     Ok(Naming { best, nearest })
 }
 
-/// The best name in the stead of term `index`, if one stands, and all that were tried, nearest first.
+/// The model with the best name in the stead of term `index`, if one stands, and all that were tried, nearest first.
+///
+/// Named causes of the same place beside the free form are tried without it, and give way to a single name.
 fn names(search: &Search, best: &Scored, index: usize) -> Result<(Option<Scored>, Vec<Nearest>), DiagnoseError> {
     let free = &best.model().terms[index];
     let (id, places) = (search.candidate(free).id, &search.candidate(free).places);
-    let mut model = best.model().clone();
-    model.terms.remove(index);
-    let without = search.fitted(&model)?;
-    let taken = |scored: &Scored| search.judged(&without) - search.judged(scored);
-    let whole = taken(best);
-    let screened = search.screen(&without)?.ranked;
-    let is_rival = |model: &Model| {
-        let last = model.terms.last().map(|term| search.candidate(term));
-        last.is_some_and(|c| !c.is_free_form && c.places.iter().any(|place| places.contains(place)))
+    let of_place = |term: &Term| search.candidate(term).places.iter().any(|place| places.contains(place));
+    let is_companion = |term: &Term| term != free && of_place(term) && !search.candidate(term).is_constant;
+    let only = |keep: &dyn Fn(&Term) -> bool| {
+        let mut model = best.model().clone();
+        model.terms.retain(keep);
+        model
     };
+    let bare = search.fitted(&only(&|term| term != free && !is_companion(term)))?;
+    let taken = |scored: &Scored| search.judged(&bare) - search.judged(scored);
+    let whole = taken(best).max(f64::MIN_POSITIVE);
     let mut tried: Vec<(f64, &str, Scored)> = Vec::new();
-    for start in search.finalists(screened.iter().filter(|(_, model)| is_rival(model)), MOST_NAMES) {
-        let mut model = start;
-        let Some(term) = model.terms.pop() else { continue };
-        let name = search.candidate(&term).id;
+    let mut attempt = |name: &'static str, model: Model| {
         (search.progress)(&format!("{name} in the stead of {id}"));
-        model.terms.insert(index, term);
         // With the model's own constants, then with all.
         for model in [model.clone(), search.with_constants(&model)] {
             let Ok(scored) = search.fitted(&model) else { continue };
-            let share = taken(&scored) / whole.max(f64::MIN_POSITIVE);
+            let share = taken(&scored) / whole;
             tried.push((share, name, scored));
             if share >= LEAST_TAKEN {
                 break;
             }
         }
+    };
+    let is_rival = |model: &Model| model.terms.last().is_some_and(|term| !search.candidate(term).is_free_form && of_place(term));
+    let screened = search.screen(&bare)?.ranked;
+    let own = PROMISING_IN_PLACE * (bare.total() - best.total());
+    let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| is_rival(model)).collect();
+    // The nearest one is shown even if it is far.
+    let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
+    for model in search.finalists(promising, MOST_NAMES) {
+        if let Some(term) = model.terms.last() {
+            attempt(search.candidate(term).id, model.clone());
+        }
+    }
+    if let Some(companion) = best.model().terms.iter().find(|term| is_companion(term)) {
+        attempt(search.candidate(companion).id, only(&|term| term != free));
     }
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut nearest: Vec<Nearest> = Vec::new();
@@ -85,6 +92,12 @@ fn names(search: &Search, best: &Scored, index: usize) -> Result<(Option<Scored>
             nearest.push(Nearest { id: (*name).into(), left: (1.0 - share).clamp(0.0, 1.0) });
         }
     }
-    let stands = tried.into_iter().next().filter(|(share, ..)| *share >= LEAST_TAKEN);
-    Ok((stands.map(|(.., scored)| scored), nearest))
+    // Of those that stand the one with the fewest parameters.
+    let standing = tried.into_iter().filter(|(share, ..)| *share >= LEAST_TAKEN).map(|(.., scored)| scored);
+    let named = standing.min_by_key(Scored::freedom);
+    if named.is_some() || !best.model().terms.iter().any(is_companion) {
+        return Ok((named, nearest));
+    }
+    let alone = search.fitted(&only(&|term| !is_companion(term)))?;
+    Ok((Some(alone).filter(|alone| taken(alone) >= LEAST_TAKEN * whole), nearest))
 }

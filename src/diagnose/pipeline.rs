@@ -11,7 +11,8 @@ use super::naming::{self, Naming};
 use super::plant::{FreeCurve, Model, Plant, Signal, Term};
 use super::residual_tests::residual_tests;
 use super::search::{Scored, Search, Split, Trial, split};
-use super::summary::{failing, summary};
+use super::stability::stability;
+use super::summary::{Findings, failing, summary};
 
 /// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
 const SEARCH_RESOLUTION: f64 = 10.0;
@@ -78,7 +79,7 @@ pub fn diagnose(
     let resolutions = plant.resolutions();
     let nominal_resolution = resolutions.first().copied().unwrap_or(1.0);
     let start = resolutions.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
-    let mut search = Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0 };
+    let mut search = Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY };
 
     progress("the nominal model");
     let nominal = search.fitted(&Model::new(Vec::new(), nominal_resolution, true))?;
@@ -126,8 +127,9 @@ pub fn diagnose(
         effects.push(adopted(&search, &best, index, term, &intervals, &tied)?);
     }
     for effect in &mut effects {
-        let tried = nearest.iter().find(|(id, _)| *id == effect.id);
-        effect.nearest = tried.map(|(_, tried)| tried.clone()).unwrap_or_default();
+        let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
+        let own = nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
+        effect.nearest = own.map(|(_, tried)| tried.clone()).unwrap_or_default();
     }
     set_roles(&mut effects, whole);
     let physics = effects.iter().filter(|effect| effect.role == Part::Cause && effect.id != "discretisation").count();
@@ -152,7 +154,8 @@ pub fn diagnose(
         (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
         _ => None,
     };
-    let unexplained = if is_unexplained || (left > LEFT_OVER && unexplained_fraction > LEFT_SHARE) {
+    let has_rest = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE;
+    let unexplained = if is_unexplained || has_rest {
         super::residual_tests::describe(plant, &search.split, &search.estimator.used, &best.residuals)
     } else {
         Vec::new()
@@ -184,7 +187,6 @@ pub fn diagnose(
     quality.extend(faults::remarks(&bench, noise, plant));
     let extended = stage(&best, parameters(&best, &intervals));
     let failed = failing(&extended.residual_tests);
-    let has_rest = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE;
     let diagnosis = Diagnosis {
         schema: 2,
         dataset: name.to_owned(),
@@ -192,14 +194,16 @@ pub fn diagnose(
         complete: verdict != Verdict::Unexplained && failed.is_none() && !has_rest,
         summary: summary(
             verdict,
-            &effects,
-            &|place| plant.place_in_words(place),
-            unexplained_fraction,
-            has_rest,
-            insufficient.as_deref(),
-            best.model().resolution,
-            refined,
-            failed.as_deref(),
+            &Findings {
+                effects: &effects,
+                place_in_words: &|place| plant.place_in_words(place),
+                left: unexplained_fraction,
+                has_rest,
+                insufficient: insufficient.as_deref(),
+                resolution: best.model().resolution,
+                refined,
+                failing: failed.as_deref(),
+            },
         ),
         // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
         unexplained_fraction: if is_unexplained || has_rest {
@@ -261,7 +265,8 @@ fn judge(search: &Search, mut best: Scored, bare: &Scored, open: f64, nominal_re
     let above = |scored: &Scored| scored.above(count);
     let (left, whole) = (above(&best), above(bare));
     let unexplained_fraction = if whole > 0.0 { (left / whole).min(1.0) } else { 0.0 };
-    let cause_count = best.model().terms.len().max(2) as f64 - 1.0;
+    let is_cause = |term: &&Term| !plant.candidates()[term.candidate].is_constant;
+    let cause_count = best.model().terms.iter().filter(is_cause).count().max(2) as f64 - 1.0;
     let least = left.min(open);
     let is_unexplained = least > LEFT_OVER && least > LEFT_SHARE / cause_count * whole;
     let unnamed = is_unexplained && unexplained_fraction > NOTHING_NAMED;
@@ -351,39 +356,44 @@ struct Causes {
     spikes: usize,
     /// χ² per value above 1 of the model with free forms; infinite without any.
     open: f64,
-    /// The names that were tried for free forms, by the name that stands or the free form.
-    nearest: Vec<(&'static str, Vec<Nearest>)>,
+    /// The places of every free form, and the names that were tried in its stead.
+    nearest: Vec<(Vec<&'static str>, Vec<Nearest>)>,
 }
 
 /// The causes, after the final refit; none where the data are insufficient.
 ///
 /// A cause that differs from run to run, such as a gain that depends on the voltage, looks like a fault of the bench, and many small faults look like a
-/// cause. So where faults are estimated, causes are selected with and without them in the way, and the less costly model counts.
+/// cause. So causes are selected first without the bench's faults in the way. If faults are left after that, they are selected again with faults in
+/// the way, and the less costly model counts.
 fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
-    let mut causes = select(search, calibrated, is_insufficient)?;
-    let cost = |causes: &Causes, search: &Search| {
-        let count = search.estimator.count(&search.split.all()) as f64;
-        causes.best.total() + causes.best.freedom() as f64 * count.ln()
-    };
     search.estimator.only_given_faults = true;
     let without = search.estimator.spread(calibrated.model(), &[])?;
-    if !is_insufficient && causes.best.model().spread != without {
-        (search.progress)("causes before faults of the bench");
-        let first = cost(&causes, search);
+    let has_faults = calibrated.model().spread != without;
+    search.estimator.only_given_faults = has_faults;
+    let start = if has_faults {
+        search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?
+    } else {
+        calibrated.clone()
+    };
+    // Two causes that cost more than the bench's faults alone are not what is missing.
+    search.limit = if has_faults { search.cost(calibrated) } else { f64::INFINITY };
+    let mut causes = select(search, &start, is_insufficient)?;
+    search.limit = f64::INFINITY;
+    if has_faults && (causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated)) {
+        (search.progress)("causes with faults of the bench in the way");
+        let plain = search.cost(&causes.best);
         let after = (search.estimator.state(), search.split.clone());
         search.estimator.restore(before.0);
         search.split = before.1;
-        let plain = search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?;
-        let other = select(search, &plain, false)?;
-        if cost(&other, search) < first - LEAST_COST {
+        let other = select(search, calibrated, is_insufficient)?;
+        if search.cost(&other.best) <= plain + LEAST_COST {
             causes = other;
         } else {
             search.estimator.restore(after.0);
             search.split = after.1;
         }
     }
-    search.estimator.only_given_faults = false;
     name_causes(search, &mut causes)?;
 
     (search.progress)("the final refit");
@@ -402,11 +412,14 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
         return Ok(());
     }
     causes.open = causes.best.above(search.estimator.count(&search.split.all()));
+    let before = causes.best.model().clone();
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
-    let of_term = best.model().terms.iter().zip(nearest).filter(|(_, tried)| !tried.is_empty());
-    causes.nearest = of_term.map(|(term, tried)| (search.candidate(term).id, tried)).collect();
+    causes.nearest = nearest;
     causes.best = search.backward(best)?;
-    causes.replaced = search.replacements(&causes.best, 4)?;
+    let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
+    if ids(causes.best.model()) != ids(&before) {
+        causes.replaced = search.replacements(&causes.best, 4)?;
+    }
     causes.coarse_total = causes.best.total();
     Ok(())
 }
@@ -418,6 +431,18 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     } else {
         search.forward(calibrated.clone())?
     };
+    if search.is_given_up(&best) {
+        search.estimator.only_given_faults = false;
+        return Ok(Causes {
+            coarse_total: best.total(),
+            best,
+            trials,
+            replaced: Vec::new(),
+            spikes: 0,
+            open: f64::INFINITY,
+            nearest: Vec::new(),
+        });
+    }
     let spikes = search.estimator.leave_out_spikes(best.model())?;
     if spikes > 0 {
         best = search.settle(best)?;
@@ -544,7 +569,7 @@ fn adopted(
         tied_with,
         share: (chi2(&without) - chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64,
         role: Part::Cause,
-        stability: None,
+        stability: stability(search, best, &without, index)?,
         curve: curve(search, best, index, found),
         nearest: Vec::new(),
         gain_heldout: gain(search, best, &without),

@@ -76,6 +76,7 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
     for line in &d.unexplained {
         let _ = writeln!(out, "<p class=\"bad\">What is left: {}</p>", prose(line));
     }
+    curves(&mut out, d);
     gain(&mut out, d, unit);
     let mut order = outcome.split.all();
     let chi2 = |run: &usize| sum_of_squares(&outcome.calibrated.residuals[*run]);
@@ -117,6 +118,31 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
         context.extended.lines().map(escape).collect::<Vec<_>>().join("\n")
     );
     document(&format!("Diagnosis of {}", d.dataset), &out)
+}
+
+/// The curves of free forms with their bands, and the nearest names.
+fn curves(out: &mut String, d: &Diagnosis) {
+    for (index, effect) in d.effects.iter().enumerate() {
+        let Some(curve) = &effect.curve else { continue };
+        let label = |name: &str, unit: &str| if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") };
+        let mut f =
+            Figure::new(&names::cause(&effect.id), &label(&curve.x_name, &curve.x_unit), &label(&curve.y_name, &curve.y_unit));
+        f.horizontal(0.0).size(HALF);
+        let along = |y: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> { (0..curve.x.len()).map(|k| (curve.x[k], y(k))).collect() };
+        f.series("estimate", along(&|k| curve.y[k]), Mark::Line);
+        f.series("95 % band", along(&|k| curve.ci95[k][0]), Mark::Line);
+        f.series("", along(&|k| curve.ci95[k][1]), Mark::Line);
+        out.push_str("<h2>The law that is missing, as a curve</h2>\n");
+        out.push_str(&figure(&format!("curve-{index}"), "", &f.svg(), ""));
+        if effect.nearest.is_empty() {
+            continue;
+        }
+        let mut table = Table::new(&["named law of the same place", "#leaves of what the curve takes (%)"]);
+        for near in &effect.nearest {
+            table.row([names::cause(&near.id).into(), fixed(100.0 * near.left, 1).into()]);
+        }
+        out.push_str(&table.html());
+    }
 }
 
 fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
@@ -234,11 +260,14 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         let tied = if others.is_empty() { String::new() } else { format!(" Tied with {}.", others.join(", ")) };
         let _ = writeln!(
             out,
-            "<p class=\"small\"><strong>{}</strong> ({}{}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
+            "<p class=\"small\"><strong>{}</strong> ({}{}{}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
              noise.{tied}</p>",
             escape(&names::cause(&effect.id)),
             effect.kind,
             if effect.role == Part::Minor { "; minor" } else { "" },
+            effect
+                .stability
+                .map_or_else(String::new, |share| format!("; chosen in {:.0} % of resamples over runs", 100.0 * share)),
             effect.id,
             prose(&effect.cause),
             fixed(100.0 * effect.gain_heldout, 1)

@@ -16,7 +16,7 @@ use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
-const LEAST_GAIN: f64 = 0.03;
+pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
 /// right; ...
 const LEAST_SHARE: f64 = 0.004;
@@ -31,6 +31,13 @@ const TIED_CHI2: f64 = 12.0;
 /// Candidates that are fitted after screening: named ones and free forms.
 const FINALISTS: usize = 7;
 const FREE_FINALISTS: usize = 3;
+/// Candidates are fitted whose linear estimate is at least this share of the best one's: in a search, among free forms, and in the place of a cause
+/// whose own share is 1.
+const PROMISING: f64 = 0.02;
+const PROMISING_FREE: f64 = 0.4;
+pub(super) const PROMISING_IN_PLACE: f64 = 0.3;
+/// Terms that are left out on trial in a round of elimination, the least significant ones.
+const LEAST_SIGNIFICANT: usize = 3;
 /// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
@@ -111,6 +118,8 @@ pub struct Search<'a> {
     pub split: Split,
     /// χ² per value above 1 of re-tuned constants on the held-out runs, set by [`calibrated`](Self::calibrated).
     pub unexplained: f64,
+    /// Models with two causes that cost more are given up; infinite for none.
+    pub limit: f64,
     /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
@@ -129,15 +138,28 @@ pub struct Screened {
     /// Every start of every candidate: its linear estimate of the fall of χ², and the model to fit from; best first.
     pub ranked: Vec<(f64, Model)>,
     /// Every start with its change of the residuals, orthogonal to the model's tangents.
-    columns: Vec<(Term, DVector<f64>)>,
+    pub(super) columns: Vec<(Term, DVector<f64>)>,
     /// The residuals, orthogonal to the model's tangents.
-    rest: DVector<f64>,
+    pub(super) rest: DVector<f64>,
+    /// The model's tangents, orthonormal.
+    pub(super) tangents: Vec<DVector<f64>>,
 }
 
 impl Search<'_> {
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
         self.estimator.plant.candidates()[candidate].id
+    }
+
+    /// Cost of a model on all runs, with ln N for each coordinate.
+    pub fn cost(&self, scored: &Scored) -> f64 {
+        scored.total() + scored.freedom() as f64 * (self.estimator.count(&self.split.all()) as f64).ln()
+    }
+
+    /// True if a model has two causes and costs more than the limit.
+    pub fn is_given_up(&self, scored: &Scored) -> bool {
+        let causes = scored.model().terms.iter().filter(|term| !self.candidate(term).is_constant).count();
+        causes >= 2 && self.cost(scored) > self.limit
     }
 
     /// Scores a fitted model on all runs.
@@ -243,6 +265,11 @@ impl Search<'_> {
         gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
     }
 
+    /// True if a free form is better than a name on held-out runs and by BIC.
+    fn is_closer(&self, free: &Scored, named: &Scored) -> bool {
+        self.judged(free) < self.judged(named) && free.bic() < named.bic() - LEAST_BIC
+    }
+
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
     fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
@@ -330,11 +357,11 @@ impl Search<'_> {
             .map(|term| {
                 let model = with(base, [term.clone()]);
                 let residuals = self.estimator.residuals_of(&model, &runs).ok()?;
-                let column = without(&own, &(DVector::from_vec(residuals.concat()) - &plain));
+                let column = without_directions(&own, &(DVector::from_vec(residuals.concat()) - &plain));
                 (column.norm_squared() > 1e-12).then_some(column)
             })
             .collect();
-        let rest = without(&own, &plain);
+        let rest = without_directions(&own, &plain);
         let mut ranked = Vec::new();
         let columns: Vec<(Term, DVector<f64>)> =
             starts.into_iter().zip(columns).filter_map(|(term, column)| Some((term, column?))).collect();
@@ -349,7 +376,7 @@ impl Search<'_> {
             ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(Screened { ranked, columns, rest })
+        Ok(Screened { ranked, columns, rest, tangents: own })
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -385,7 +412,7 @@ impl Search<'_> {
     /// The two screened causes that would lower χ² most together, if by more than twice what the best does alone: other pairs are found one cause
     /// at a time.
     fn pair(&self, base: &Model, screened: &Screened) -> Option<Model> {
-        let Screened { ranked, columns, rest } = screened;
+        let Screened { ranked, columns, rest, .. } = screened;
         let mut least = 2.0 * ranked.first().map_or(0.0, |(gain, _)| *gain);
         let sizes: Vec<[f64; 2]> = columns.iter().map(|(_, u)| [u.norm_squared(), u.dot(rest)]).collect();
         let mut pair = None;
@@ -415,7 +442,7 @@ impl Search<'_> {
 
     /// A start moved along the line from its off value, and true if the bounds allow the direction: a cause of one sign that the data need with the
     /// other one is not moved.
-    fn moved(&self, start: &Term, along: f64) -> (Term, bool) {
+    pub(super) fn moved(&self, start: &Term, along: f64) -> (Term, bool) {
         let parameters = &self.estimator.plant.candidates()[start.candidate].parameters;
         if parameters.iter().all(|p| p.off.is_none_or(|off| off <= p.bounds[0] || off >= p.bounds[1])) && along < 0.05 {
             return (start.clone(), false);
@@ -440,7 +467,7 @@ impl Search<'_> {
         let mut orthogonal: Vec<DVector<f64>> = Vec::new();
         for column in columns {
             let size = column.norm();
-            let rest = without(&orthogonal, &column);
+            let rest = without_directions(&orthogonal, &column);
             let left = rest.norm();
             if left > 1e-6 * size && left > 0.0 {
                 orthogonal.push(rest / left);
@@ -469,8 +496,11 @@ impl Search<'_> {
         (self.progress)("screening all candidates");
         let screened = self.screen(from)?;
         let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
-        let mut finalists = self.finalists(named, FINALISTS);
-        finalists.extend(self.finalists(free, FREE_FINALISTS));
+        let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let most_free = free.first().map_or(0.0, |(gain, _)| *gain);
+        let mut finalists = self.finalists(named.into_iter().filter(|(gain, _)| *gain >= PROMISING * most), FINALISTS);
+        finalists
+            .extend(self.finalists(free.into_iter().filter(|(gain, _)| *gain >= PROMISING_FREE * most_free), FREE_FINALISTS));
         let mut trials = Vec::new();
         for model in finalists {
             let Some(term) = model.terms.last() else { continue };
@@ -486,11 +516,16 @@ impl Search<'_> {
             of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
         };
         let judged = |scored: &Scored| self.judged(scored);
-        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false), best(&judged, true)];
+        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false)];
+        // A free form that is no better than a name loses anyway.
+        let is_ahead = |free: &usize| ahead[0].is_none_or(|named| judged(&trials[*free].scored) < judged(&trials[named].scored));
+        ahead.push(best(&judged, true).filter(is_ahead));
         ahead.dedup();
         for index in ahead.into_iter().flatten() {
             let model = trials[index].scored.model().clone();
-            trials[index].scored = self.fitted(&model)?;
+            if let Ok(scored) = self.fitted(&model) {
+                trials[index].scored = scored;
+            }
         }
         trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
         Ok((trials, screened))
@@ -510,11 +545,11 @@ impl Search<'_> {
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
             let (trials, screened) = self.trials(&best)?;
-            // A free form has to be worth more than the best name.
+            // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
             let top_of =
                 |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
             let top = match (top_of(false), top_of(true)) {
-                (Some(named), Some(free)) => Some(if self.is_worth(free, named) { free } else { named }),
+                (Some(named), Some(free)) => Some(if self.is_closer(free, named) { free } else { named }),
                 (named, free) => named.or(free),
             };
             let top = top.cloned();
@@ -529,9 +564,14 @@ impl Search<'_> {
                 first.get_or_insert(trials);
                 break;
             };
-            best = self.settle(worthy)?;
+            // The discretisation is refined before another cause could take its error.
+            let settled = self.settle(worthy)?;
+            best = self.resolve(settled)?;
             if first.is_none() {
                 first = Some(trials);
+            }
+            if self.is_given_up(&best) {
+                break;
             }
         }
         Ok((best, first.unwrap_or_default()))
@@ -597,7 +637,7 @@ impl Search<'_> {
                 best = self.fitted(shorter(idle)?.model())?;
                 continue;
             }
-            let shorter = (0..best.model().terms.len()).map(shorter).collect::<Result<Vec<_>, _>>()?;
+            let shorter = self.least_significant(&best).into_iter().map(shorter).collect::<Result<Vec<_>, _>>()?;
             let Some(least) = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(best) };
             let least = self.fitted(least.model())?;
             if self.is_needed(&best, &least) || self.is_seen_by_fit(&best, &least) {
@@ -605,6 +645,26 @@ impl Search<'_> {
             }
             best = least;
         }
+    }
+
+    /// The [`LEAST_SIGNIFICANT`] terms by Wald's statistic dᵀ C⁻¹ d, with d the distances of a term's coordinates from their off values and C their
+    /// covariance.
+    fn least_significant(&self, best: &Scored) -> Vec<usize> {
+        let covariance = covariance(&best.fit.information);
+        let mut first = 0;
+        let mut order: Vec<(f64, usize)> = Vec::new();
+        for (index, term) in best.model().terms.iter().enumerate() {
+            let parameters = &self.candidate(term).parameters;
+            let own: Vec<(usize, f64)> =
+                (0..term.x.len()).filter_map(|k| Some((first + k, term.x[k] - parameters[k].off?))).collect();
+            first += term.x.len();
+            let part = DMatrix::from_fn(own.len(), own.len(), |i, j| covariance[(own[i].0, own[j].0)]);
+            let d = DVector::from_iterator(own.len(), own.iter().map(|(_, d)| *d));
+            let wald = part.lu().solve(&d).map_or(0.0, |solved| d.dot(&solved));
+            order.push((if wald.is_finite() { wald } else { 0.0 }, index));
+        }
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order.into_iter().take(LEAST_SIGNIFICANT).map(|(_, index)| index).collect()
     }
 
     /// True if `less`, a model with one term less, leaves out too much: new physics has to be worth it, a constant has to be significant only.
@@ -627,7 +687,9 @@ impl Search<'_> {
             let without = self.fitted(&model)?;
             let screened = self.screen(&without)?.ranked;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
-            let others = screened.iter().filter(|(_, m)| is_other(m) && !self.ends_free(m));
+            let own = without.total() - best.total();
+            let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m) && !self.ends_free(m);
+            let others = screened.iter().filter(is_promising);
             for model in self.finalists(others, most) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
@@ -676,7 +738,7 @@ fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
 }
 
 /// The part of a vector that is orthogonal to orthonormal ones.
-fn without(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
+pub(super) fn without_directions(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
     let mut rest = vector.clone();
     for direction in unit {
         let along = direction.dot(&rest);
@@ -877,7 +939,13 @@ mod tests {
     fn found(plant: &Waves) -> Vec<&'static str> {
         let progress = |_: &str| {};
         let estimator = Estimator::new(plant);
-        let mut search = Search { estimator, split: split(plant, &[Role::Auto; 6]), unexplained: 0.0, progress: &progress };
+        let mut search = Search {
+            estimator,
+            split: split(plant, &[Role::Auto; 6]),
+            unexplained: 0.0,
+            limit: f64::INFINITY,
+            progress: &progress,
+        };
         let plain = search.calibrated(1.0).unwrap();
         let (best, _) = search.forward(plain).unwrap();
         best.model().terms.iter().map(|term| search.id(term.candidate)).collect()

@@ -48,19 +48,29 @@ fn located(effect: &Adopted, place_in_words: &dyn Fn(&str) -> String) -> String 
     format!("another law of {}, shown as a curve{near}", place_in_words(&effect.place))
 }
 
-/// The verdict in a sentence. `has_rest` is true if more than chance and a small share is left. `left` is the unexplained fraction, `insufficient` why the data are insufficient, `failing` the result of [`failing`]
-/// for the extended model.
-pub(super) fn summary(
-    verdict: Verdict,
-    effects: &[Adopted],
-    place_in_words: &dyn Fn(&str) -> String,
-    left: f64,
-    has_rest: bool,
-    insufficient: Option<&str>,
-    resolution: f64,
-    refined: bool,
-    failing: Option<&str>,
-) -> String {
+/// What the sentence is about.
+pub(super) struct Findings<'a> {
+    /// All adopted causes.
+    pub(super) effects: &'a [Adopted],
+    /// Names of places in a sentence.
+    pub(super) place_in_words: &'a dyn Fn(&str) -> String,
+    /// The unexplained fraction.
+    pub(super) left: f64,
+    /// True if that is more than chance and a small share.
+    pub(super) has_rest: bool,
+    /// Why the data are insufficient, if so.
+    pub(super) insufficient: Option<&'a str>,
+    /// Joints per actuator.
+    pub(super) resolution: f64,
+    /// True if the data need more joints than the nominal model has.
+    pub(super) refined: bool,
+    /// The result of [`failing`] for the extended model.
+    pub(super) failing: Option<&'a str>,
+}
+
+/// The verdict in a sentence.
+pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
+    let Findings { effects, place_in_words, left, has_rest, insufficient, resolution, refined, failing } = *findings;
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
     let name = |effect: &Adopted| {
@@ -105,7 +115,7 @@ pub(super) fn summary(
                 but.replacen(", but", ":", 1)
             ),
             (None, false) => format!(
-                "{named} explains a part, but {:.0} % of the misfit is left, which no cause in the library explains{}.",
+                "{named} explains a part, but {:.1} % of the misfit is left, which no cause in the library explains{}.",
                 100.0 * left,
                 but.replacen(", but", ", and", 1)
             ),
@@ -121,6 +131,17 @@ pub(super) fn summary(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const NOTHING: Findings = Findings {
+        effects: &[],
+        place_in_words: &str::to_owned,
+        left: 0.0,
+        has_rest: false,
+        insufficient: None,
+        resolution: 3.0,
+        refined: false,
+        failing: None,
+    };
 
     fn tests(count: usize, failed: usize) -> Vec<ResidualTest> {
         let test = |index: usize| ResidualTest {
@@ -149,12 +170,14 @@ mod tests {
         assert_eq!(words, "3 of 80 residual tests still fail, more than chance explains (drift in log time 2, loop area 1)");
         for verdict in [Verdict::None, Verdict::Named, Verdict::Tied, Verdict::Unexplained] {
             for insufficient in [None, Some("one run is too little")] {
-                let first = |failing| summary(verdict, &[], &str::to_owned, 0.3, false, insufficient, 10.0, true, failing);
+                let first = |failing| {
+                    summary(verdict, &Findings { left: 0.3, insufficient, resolution: 10.0, refined: true, failing, ..NOTHING })
+                };
                 assert!(first(Some(words.as_str())).split(". ").next().unwrap().contains(&words), "{verdict:?}");
                 assert!(!first(None).contains("residual tests"));
             }
         }
-        let honest = summary(Verdict::None, &[], &str::to_owned, 0.0, false, None, 3.0, false, Some(&words));
+        let honest = summary(Verdict::None, &Findings { failing: Some(&words), ..NOTHING });
         assert!(!honest.contains("explains the data"), "{honest}");
     }
 }

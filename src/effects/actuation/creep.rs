@@ -79,6 +79,11 @@ pub const CREEP: Effect = Effect {
                 given: &[("rungs_per_decade", 2.0)],
             },
             Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2)],
+                starts: &[&[0.02, 0.0]],
+                given: &[("rungs_per_decade", 1.0), ("fastest_s", 0.01)],
+            },
+            Form {
                 fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
                 starts: &[&[0.02, 0.3], &[0.02, 3.0]],
                 given: &[("rungs_per_decade", 0.0)],

@@ -5,12 +5,13 @@
 //! ```
 //!
 //! # Parameters
-//! * `share_1` (–): weight of the element with T = 0.03 s
-//! * `share_2` (–): weight of the element with T = 0.1 s
-//! * `share_3` (–): weight of the element with T = 0.3 s
-//! * `share_4` (–): weight of the element with T = 1 s
-//! * `share_5` (–): weight of the element with T = 3 s
-//! * `share_6` (–): weight of the element with T = 10 s
+//! * `share_1` (–): weight of the element with T = 0.01 s
+//! * `share_2` (–): weight of the element with T = 0.03 s
+//! * `share_3` (–): weight of the element with T = 0.1 s
+//! * `share_4` (–): weight of the element with T = 0.3 s
+//! * `share_5` (–): weight of the element with T = 1 s
+//! * `share_6` (–): weight of the element with T = 3 s
+//! * `share_7` (–): weight of the element with T = 10 s
 //!
 //! # Source
 //! Kelvin-Voigt chain: Tschoegl, The Phenomenological Theory of Linear Viscoelastic Behavior, 1989.
@@ -31,7 +32,7 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
             bounds: [0.0, 1.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "weight of the element with T = 0.03 s",
+            about: "weight of the element with T = 0.01 s",
         },
         Parameter {
             name: "share_2",
@@ -39,7 +40,7 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
             bounds: [0.0, 1.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "weight of the element with T = 0.1 s",
+            about: "weight of the element with T = 0.03 s",
         },
         Parameter {
             name: "share_3",
@@ -47,7 +48,7 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
             bounds: [0.0, 1.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "weight of the element with T = 0.3 s",
+            about: "weight of the element with T = 0.1 s",
         },
         Parameter {
             name: "share_4",
@@ -55,7 +56,7 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
             bounds: [0.0, 1.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "weight of the element with T = 1 s",
+            about: "weight of the element with T = 0.3 s",
         },
         Parameter {
             name: "share_5",
@@ -63,10 +64,18 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
             bounds: [0.0, 1.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "weight of the element with T = 3 s",
+            about: "weight of the element with T = 1 s",
         },
         Parameter {
             name: "share_6",
+            unit: "",
+            bounds: [0.0, 1.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "weight of the element with T = 3 s",
+        },
+        Parameter {
+            name: "share_7",
             unit: "",
             bounds: [0.0, 1.0],
             off: Some(0.0),
@@ -85,15 +94,16 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
                 ("share_4", 0.02),
                 ("share_5", 0.02),
                 ("share_6", 0.02),
+                ("share_7", 0.02),
             ],
             starts: &[
-                &[0.02, 0.02, 0.02, 0.02, 0.02, 0.02],
-                &[0.02, 0.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.02, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.02, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.02, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.02, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.02],
+                &[0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.02, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.02, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.02, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.02],
             ],
             given: &[],
         }],
@@ -109,4 +119,4 @@ pub const FREE_VOLTAGE_MEMORY: Effect = Effect {
 };
 
 /// T_j (s).
-const TIMES: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
+const TIMES: [f64; 7] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0];

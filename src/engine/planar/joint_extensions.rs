@@ -2,8 +2,8 @@
 //! and drag in air.
 //!
 //! The step stays one problem that is linear in the mean rates u: a joint's extra torque e is put as e* − s (u − u*), about the rate u* of the
-//! step before. For softening, curves of the deviation and springs with a limit s is the tangent, which errs by the square of what changes in a step.
-//! For dry friction, τ_c tanh(u/ω), and curves of the rate the step is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
+//! step before. For softening, curves and springs with a limit s is the tangent, which errs by the square of what changes in a step. For dry friction,
+//! τ_c tanh(u/ω), the step is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
 //! with the secant −e*/u*, whose quadratic potential majorises that of friction, so that a repetition can only lower the cost. The Prony chain is linear and
 //! exact over a step.
 
@@ -89,7 +89,7 @@ impl JointExtensions {
     }
 
     pub(super) fn is_repeated(&self) -> bool {
-        self.friction != 0.0
+        self.extensions.dry_friction != 0.0
     }
 
     /// Whether the torque depends on the elastic deviation alone.
@@ -168,7 +168,8 @@ impl JointExtensions {
     /// Slope s and constant part e* + s u* of friction about the rate `u` of the joint in a lane.
     fn friction(&self, lane: usize, u: f64, turned_back: bool) -> (f64, f64) {
         let [moment, slope] = self.resistance(lane, u);
-        if u.abs() > FAST * DRY_FRICTION_RATE && !turned_back {
+        // A curve of the rate is smooth.
+        if (!self.is_repeated() || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
             (slope, slope * u - moment)
         } else {
             (if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0)
@@ -221,7 +222,7 @@ impl JointExtensions {
         for (k, quad) in quads.iter().enumerate() {
             let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
             before = quad.mean[0].level(1);
-            if self.friction != 0.0 {
+            if self.is_repeated() {
                 for lane in 0..4 {
                     let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
                     let (slope, rest) = self.friction(lane, before, self.turned_back[k][lane]);
@@ -300,5 +301,5 @@ fn prony(step: f64) -> [[f64; 4]; LOSS_TIMES.len()] {
 
 /// The sign of a joint's angle in a lane: angles count outwards from the root, and on the right arm that is the opposite sense.
 fn sense(lane: usize) -> f64 {
-    if lane % 2 == 0 { 1.0 } else { -1.0 }
+    if lane.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
