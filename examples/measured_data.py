@@ -67,7 +67,8 @@ class Mode:
         rest, speed = h.real - 1, (drive * h).real
         x = (speed - b * rest) / (a - b)
         y = rest - x
-        mean = lambda root: cmath.exp(root * time) * cmath.sinh(0.5 * root * exposure) / (0.5 * root * exposure)
+        at = lambda root, sign: cmath.exp(root * (time + 0.5 * sign * exposure))
+        mean = lambda root: (at(root, 1) - at(root, -1)) / (root * exposure)
         return 0.5 * (1 - (h * mean(drive)).real + (x * mean(a) + y * mean(b)).real)
 
 
@@ -123,16 +124,16 @@ def released():
 
 
 def exposure():
-    """Sines filmed at 60 frames a second with an exposure of 12 ms; nothing is hidden. The voltage is logged at 250 Hz."""
+    """Sines filmed at 60 frames a second with an exposure of 16 ms; nothing is hidden. The voltage is logged at 250 Hz."""
     noise = random.Random(2)
     modes = [Mode(i + 1) for i in range(6)]
     for frequency in [3, 8, 13, 17]:
-        volt = lambda t: 20 * (1 - math.cos(2 * math.pi * frequency * t))
+        volt = lambda t: 50 * (1 - math.cos(2 * math.pi * frequency * t))
         rows = [[f"{k / 250:.3f}", f"{volt(k / 250):.3f}"] for k in range(271)]
         write(HERE / f"exposure/{frequency}hz-volts.csv", ["t_s", "v1_v"], rows)
         rows = []
         for frame in range(1, 61):
-            z = sag() + 10 * sum(40 * m.of_volt * m.tip * m.driven(frequency, frame / 60, 0.012) for m in modes)
+            z = sag() + 10 * sum(100 * m.of_volt * m.tip * m.driven(frequency, frame / 60, 0.016) for m in modes)
             rows.append([frame, f"{z + noise.gauss(0, 0.04):.3f}"])
         write(HERE / f"exposure/{frequency}hz-camera.csv", ["frame", "tip_z_mm"], rows)
 

@@ -68,7 +68,7 @@ fn the_height_of_one_point_is_enough() {
 fn the_exposure_of_frames_is_no_error_of_the_model() {
     let d = diagnosed("exposure");
     assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("none"), vec![]), "{}", d["summary"]);
-    // Without it the motion at 17 Hz is 7 % smaller than predicted, fifteen times the noise.
+    // Without it the motion at 17 Hz is 12 % smaller than predicted, thirteen times the noise.
     let folder = tempfile::tempdir().unwrap();
     for file in std::fs::read_dir(example("exposure")).unwrap().map(|file| file.unwrap().path()) {
         std::fs::copy(&file, folder.path().join(file.file_name().unwrap())).unwrap();
