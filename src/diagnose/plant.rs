@@ -129,6 +129,8 @@ pub struct Signal {
     pub channels: Vec<usize>,
     /// Input of the first actuator at the time of each value (V for robots).
     pub inputs: Vec<f64>,
+    /// True for a frequency response: `times` are frequencies (Hz), and the noise is white, of the given level.
+    pub is_spectrum: bool,
 }
 
 /// A system that was measured in runs and can be simulated.
@@ -163,6 +165,11 @@ pub trait Plant: Sync {
     /// Standard deviations of the bench's faults that are known, in the order of [`Spread::of`]; the others are estimated.
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         [None; bench::KINDS]
+    }
+
+    /// True if a run can have faults of a kind, an index of [`Spread::of`]; one without times of its own has no clock and no drift.
+    fn has_fault(&self, _run: usize, _kind: usize) -> bool {
+        true
     }
 
     /// True if a term exceeds the error of the discretisation.

@@ -102,14 +102,7 @@ impl RobotPlant {
             let command_times: Vec<f64> = command_times.iter().map(|t| t - run.origin).collect();
             let volts: Vec<f64> = volts.iter().map(|v| if *v > 0.0 { v * gain } else { *v }).collect();
             let command = Command::new(&command_times, &volts, n);
-            let mut signal = Signal {
-                id: run.id.clone(),
-                values: Vec::new(),
-                sigmas: Vec::new(),
-                times: Vec::new(),
-                channels: Vec::new(),
-                inputs: Vec::new(),
-            };
+            let mut signal = Signal { id: run.id.clone(), is_spectrum: run.response.is_some(), ..Signal::default() };
             for (channel, (column, usable)) in run.channels.iter().zip(masks).enumerate() {
                 for (row, value) in column.iter().enumerate().filter(|(row, _)| usable[*row]) {
                     signal.values.push(*value);
@@ -331,12 +324,30 @@ impl Plant for RobotPlant {
 
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         let Bench { clock_ms, zero_mm, gain, drift_mm_per_s } = self.bench;
-        if self.without_voltage {
+        let clock = clock_ms.map(|ms| 1e-3 * ms);
+        let mut given = if self.without_voltage {
             // There is no gain, and no second clock: its offset is that of the release.
-            return [clock_ms.map(|ms| 1e-3 * ms), Some(0.0), Some(0.0), gain, zero_mm, drift_mm_per_s];
+            [clock, Some(0.0), Some(0.0), gain, zero_mm, drift_mm_per_s]
+        } else {
+            // A given gain is that of the voltage; the camera's scale then has none of its own.
+            [clock, None, gain, gain.map(|_| 0.0), zero_mm, drift_mm_per_s]
+        };
+        for (kind, given) in given.iter_mut().enumerate() {
+            if !(0..self.runs.len()).any(|run| self.has_fault(run, kind)) {
+                *given = Some(0.0);
+            }
         }
-        // A given gain is that of the voltage; the camera's scale then has none of its own.
-        [clock_ms.map(|ms| 1e-3 * ms), None, gain, gain.map(|_| 0.0), zero_mm, drift_mm_per_s]
+        given
+    }
+
+    fn has_fault(&self, run: usize, kind: usize) -> bool {
+        let Run { response, has_clock, duration, .. } = &self.runs[run];
+        match kind {
+            // An analyser takes its sines out of zero and drift, on one clock, with one scale.
+            _ if response.is_some() => kind == Spread::GAIN,
+            Spread::CLOCK | Spread::RATE | Spread::DRIFT => *has_clock && *duration > 0.0,
+            _ => true,
+        }
     }
 
     /// A constant counts only beyond the error of the discretisation: 1/(2m²) of the stiffness for m joints, six times that of the damping, and
@@ -463,7 +474,7 @@ impl RobotPlant {
             let samples: Vec<f64> = tracks.into_iter().map(|at| 10.0 * view.of(at)[response.channel % 2]).collect();
             Ok(sine.parts(&samples, self.exposure))
         };
-        let parts: Vec<[f64; 2]> = response.frequencies.iter().map(of).collect::<Result<_, _>>()?;
+        let parts: Vec<[f64; 2]> = response.frequencies.par_iter().map(of).collect::<Result<_, _>>()?;
         Ok([0, 1].into_iter().flat_map(|part| parts.iter().map(move |parts| parts[part])).collect())
     }
 }
