@@ -237,7 +237,11 @@ fn files_shapes_and_robots_of_a_run_are_checked_and_named_with_their_lines() {
     // The run's table is line 8, its further keys line 11 and on.
     for (toml, code, words) in [
         (format!("{HEAD}{RUN}"), 3, vec!["a.csv, line 1", "v1_v is missing", "voltage_file"]),
-        (format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n"), 3, vec!["a.csv", "does not overlap", "from 0 to 0.2", "from 5 to 6"]),
+        (
+            format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n"),
+            3,
+            vec!["x.toml, line 11: run a: voltage_file", "a.csv", "does not overlap", "from 0 to 0.2", "from 5 to 6", "v.csv"],
+        ),
         (format!("{HEAD}{RUN}voltage_file = \"w.csv\"\n"), 3, vec!["w.csv, line 1, column 3", "tip_z_mm"]),
         (
             format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n").replace("a.csv", "w.csv"),

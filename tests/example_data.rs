@@ -6,6 +6,11 @@ use std::path::{Path, PathBuf};
 
 use common::sfers;
 use serde_json::Value;
+use sfers::diagnose::bench::{KINDS, Spread};
+use sfers::diagnose::dataset::Dataset;
+use sfers::diagnose::plant::Plant;
+use sfers::diagnose::quality;
+use sfers::diagnose::robot::RobotPlant;
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
@@ -33,6 +38,24 @@ fn parameter(diagnosis: &Value, id: &str) -> [f64; 3] {
     let effect = diagnosis["effects"].as_array().unwrap().iter().find(|effect| effect["id"] == id).unwrap();
     let parameter = &effect["parameters"][0];
     [&parameter["value"], &parameter["ci95"][0], &parameter["ci95"][1]].map(|x| x.as_f64().unwrap())
+}
+
+/// Faults that a data set has: those of one run, and those that may be estimated.
+#[test]
+fn runs_without_times_have_no_clock_and_no_drift() {
+    const TIMED: [usize; 3] = [Spread::CLOCK, Spread::RATE, Spread::DRIFT];
+    for (name, run, all) in [
+        ("slow_loops", &[Spread::GAIN, Spread::SCALE, Spread::ZERO][..], &[][..]),
+        ("frequency_response", &[Spread::GAIN], &[]),
+        ("one_point", &[0, 1, 2, 3, 4, 5], &[0, 1, 2, 3, 4, 5]),
+    ] {
+        let dataset = Dataset::read(&example(name).join("dataset.toml")).unwrap();
+        let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+        let faults: Vec<usize> = (0..KINDS).filter(|kind| plant.has_fault(0, *kind)).collect();
+        let free: Vec<usize> = (0..KINDS).filter(|kind| plant.bench()[*kind].is_none()).collect();
+        assert_eq!((&faults[..], &free[..]), (run, all), "{name}");
+        assert!(name == "one_point" || TIMED.iter().all(|kind| plant.bench()[*kind] == Some(0.0)), "{name}");
+    }
 }
 
 #[test]

@@ -373,6 +373,31 @@ mod tests {
     }
 
     #[test]
+    fn a_frequency_response_has_the_noise_that_it_is_given() {
+        let (mut signals, mut used, mut residuals) = data(|_, _, random, _| 2.0 * random.normal());
+        let without = estimate(&signals, &used, &residuals).unwrap();
+        // What a model lacks at constant amplitude would pass for noise of 0.5 σ.
+        let channels = vec![1; 200];
+        let inputs = vec![100.0; 200];
+        signals.push(Signal {
+            times: signals[0].times[..200].to_vec(),
+            values: inputs.clone(),
+            channels,
+            inputs,
+            is_spectrum: true,
+            ..Signal::default()
+        });
+        used.push(vec![true; 200]);
+        residuals.push((0..200).map(|k| 0.7 * f64::from(k % 7 - 3).signum()).collect());
+        let noise = estimate(&signals, &used, &residuals).unwrap();
+        assert_eq!((noise.factors[0], noise.factors[1]), (without.factors[0], 1.0));
+        let exact = Noise { factors: vec![2.0, 1.0], correlated: 0.5, time_s: 0.03 };
+        let mut own = residuals[4].clone();
+        exact.whiten(&signals[4], &used[4], &mut own);
+        assert_eq!(own, residuals[4]);
+    }
+
+    #[test]
     fn a_hum_is_no_noise() {
         let (signals, used, residuals) = data(|t, _, random, _| 2.5 * (std::f64::consts::TAU * 7.3 * t).sin() + random.normal());
         assert_eq!(estimate(&signals, &used, &residuals), None);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::run_csv::{self, Rows, Voltages, Wanted};
 use super::super::{robot, voltage};
-use super::read::{Reader, beyond, check_effects, resolved_robot, value_error};
+use super::read::{Reader, beyond, check_effects, line_of, resolved_robot, value_error};
 use super::{DataError, Log, MOST_STEPS, MeasuredRun, Release, RunEntry, Start};
 use crate::analytic;
 use crate::experiment::{Config, MaterialConfig, RobotConfig};
@@ -87,12 +87,21 @@ impl Reader<'_> {
             let seen = [rows.times[0], rows.times[rows.times.len() - 1]];
             let left_out = keep(&mut rows, robot.actuators, ends);
             let [a, b, c, d] = [seen[0], seen[1], ends[0], ends[1]].map(number);
-            let clocks = format!("t_s goes from {a} to {b} s in this file and from {c} to {d} s in {}", file.display());
+            let clocks = format!("t_s goes from {a} to {b} s in {} and from {c} to {d} s in {}", path.display(), file.display());
             match (left_out, rows.times.len()) {
                 (0, _) => {}
                 (_, 0 | 1) => {
                     let advice = "give both the same zero to within some seconds; smaller offsets are found ([bench], clock_ms)";
-                    return Err(bad(&path, entry, format!("its clock does not overlap that of the voltage: {clocks}; {advice}")));
+                    let number = index.to_string();
+                    return Err(DataError::Content {
+                        path: self.path.into(),
+                        line: line_of(self.text, &["run", &number, "voltage_file"]),
+                        column: 0,
+                        reason: format!(
+                            "run {}: voltage_file: its clock does not overlap that of the positions: {clocks}; {advice}",
+                            entry.id
+                        ),
+                    });
                 }
                 (left_out, _) => {
                     rows.remarks.push(format!("{left_out} rows without a known voltage are left out: {clocks}"));

@@ -2,8 +2,8 @@
 //!
 //! Newton steps minimise the energy Σ k (θ − θ_V)²/2 + Σ m g z with the corners above the floor. They leave out how the lever arms of gravity and floor
 //! change, so a step is the same O(n) problem as a step in time, with displacements for velocities, k for the implicit terms and a frictionless floor. What is
-//! left out is mostly small beside k, so the steps converge linearly; where it is not they overshoot and are shortened. Without friction the equilibrium on the floor does not depend on how it is reached; the
-//! centre of mass keeps its x.
+//! left out is mostly small beside k, so the steps converge linearly; where it is not they overshoot and are shortened. Without friction the equilibrium on
+//! the floor does not depend on how it is reached; the centre of mass keeps its x.
 
 use fearless_simd::{Simd, dispatch, prelude::*};
 use wide::f64x2;
