@@ -92,9 +92,13 @@ fn names(search: &Search, best: &Scored, index: usize) -> Result<(Option<Scored>
             nearest.push(Nearest { id: (*name).into(), left: (1.0 - share).clamp(0.0, 1.0) });
         }
     }
-    // Of those that stand the one with the fewest parameters.
-    let standing = tried.into_iter().filter(|(share, ..)| *share >= LEAST_TAKEN).map(|(.., scored)| scored);
-    let named = standing.min_by_key(Scored::freedom);
+    // Of those that stand, and that the runs do not tell from the best of them, the one with the fewest parameters.
+    let mut standing: Vec<Scored> =
+        tried.into_iter().filter(|(share, ..)| *share >= LEAST_TAKEN).map(|(.., scored)| scored).collect();
+    if let Some(least) = standing.iter().min_by(|a, b| a.total().total_cmp(&b.total())).cloned() {
+        standing.retain(|other| search.is_tied(&least, other));
+    }
+    let named = standing.into_iter().min_by_key(Scored::freedom);
     if named.is_some() || !best.model().terms.iter().any(is_companion) {
         return Ok((named, nearest));
     }
