@@ -146,6 +146,7 @@ impl Emps {
                 channels: vec![0; values.len()],
                 inputs: pick(&velocity_m_s),
                 values,
+                ..Signal::default()
             }
         };
         let signals = rows.iter().enumerate().map(of).collect();

@@ -71,6 +71,7 @@ impl Oscillator {
                 inputs: times.iter().map(|t| force(*drive, *t)).collect(),
                 times,
                 channels: vec![0; ROWS],
+                ..Signal::default()
             });
         }
         let candidate = |id, cause, is_constant, name, off: f64, bounds, scale, start: f64| Candidate {

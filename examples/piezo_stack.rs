@@ -165,6 +165,7 @@ impl Stack {
             times: (0..to - from).map(|row| row as f64 * INTERVAL_S).collect(),
             channels: vec![0; to - from],
             inputs: inputs_v[*session][*from..*to].to_vec(),
+            ..Signal::default()
         };
         Ok(Self { signals: STRETCHES.iter().map(signal).collect(), candidates: candidates(), inputs_v })
     }

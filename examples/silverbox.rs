@@ -144,6 +144,7 @@ impl Silverbox {
             times: (0..to - from).map(|row| row as f64 * INTERVAL_S).collect(),
             channels: vec![0; to - from],
             inputs: input[from..to].to_vec(),
+            ..Signal::default()
         };
         let signals = rows.iter().enumerate().map(of).collect();
         Ok(Self { signals, candidates: candidates(), input_v: between_rows(&input), rows })

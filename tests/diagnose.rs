@@ -227,6 +227,113 @@ fn bad_data_are_refused_with_file_line_and_column() {
 }
 
 #[test]
+fn files_shapes_and_robots_of_a_run_are_checked_and_named_with_their_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("a.csv", "t_s,tip_z_mm\n0,1\n0.1,1\n0.2,2\n");
+    write("v.csv", "t_s,v1_v\n5,0\n6,0\n");
+    write("w.csv", "t_s,v1_v,tip_z_mm\n0,0,1\n1,0,1\n");
+    let released = |keys: &str| format!("{HEAD}{RUN}start = \"released\"\n[run.release]\n{keys}\n");
+    // The run's table is line 8, its further keys line 11 and on.
+    for (toml, code, words) in [
+        (format!("{HEAD}{RUN}"), 3, vec!["a.csv, line 1", "v1_v is missing", "voltage_file"]),
+        (
+            format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n"),
+            3,
+            vec!["x.toml, line 11: run a: voltage_file", "a.csv", "does not overlap", "from 0 to 0.2", "from 5 to 6", "v.csv"],
+        ),
+        (format!("{HEAD}{RUN}voltage_file = \"w.csv\"\n"), 3, vec!["w.csv, line 1, column 3", "tip_z_mm"]),
+        (
+            format!("{HEAD}{RUN}voltage_file = \"v.csv\"\n").replace("a.csv", "w.csv"),
+            3,
+            vec!["w.csv, line 1, column 2", "voltage_file"],
+        ),
+        (format!("{HEAD}{RUN}voltage_file = \"x.csv\"\n"), 3, vec!["x.csv"]),
+        (format!("{HEAD}{RUN}start = \"released\"\n"), 2, vec!["line 11", "without a shape", "hung_g", "level", "held"]),
+        (format!("{HEAD}{RUN}start = \"let go\"\n"), 2, vec!["line 11", "start", "released"]),
+        (format!("{HEAD}{RUN}[run.release]\nlevel = true\n"), 2, vec!["line 11", "start = \"released\""]),
+        (released("at_s = 0.1"), 2, vec!["line 12", "no shape"]),
+        (released("level = false"), 2, vec!["line 12", "no shape"]),
+        (released("level = true\nhung_g = 1"), 2, vec!["line 12", "more than one"]),
+        (released("hung_g = -1"), 2, vec!["line 13", "hung_g", "-1"]),
+        (released("held = \"nose\"\nheld_z_mm = 3"), 2, vec!["line 13", "nose", "tip"]),
+        (released("held = \"tip\"\nheld_z_mm = 99"), 2, vec!["line 14", "held_z_mm", "99"]),
+        (released("level = true\nat_s = 7"), 2, vec!["line 14", "at_s", "from 0 to 0.2"]),
+        (released("level = true\nfrom = 7"), 2, vec!["line 14", "from"]),
+        (released("level = true\n[run.robot]\nactuators = 2"), 2, vec!["line 15", "actuators", "a file of its own"]),
+        (released("level = true\n[run.material]\nactuator_length_mm = 50"), 2, vec!["100 mm", "50 mm long", "[run.markers]"]),
+        (released("level = true\n[run.material]\nactuator_length_mm = -5"), 2, vec!["line 15", "actuator_length_mm", "-5"]),
+        (released("level = true\n[run.markers]\nnose = 5"), 2, vec!["line 15", "nose"]),
+        (released("level = true\n[[run.effect]]\nid = \"hysteresis\""), 2, vec!["line 14", "structure", "tip-mass"]),
+        (released("level = true\n[[run.effect]]\nid = \"tip-mass\"\nmass_g = -1"), 2, vec!["line 14", "mass_g", "-1"]),
+        (format!("[[effect]]\nid = \"creep\"\n{}", released("level = true")), 2, vec!["line 1", "creep", "structure"]),
+        (format!("[columns]\ntip_y_mm = {{ from = \"y\" }}\n{}", released("level = true")), 2, vec!["line 2", "tip_y_mm"]),
+        (format!("[columns]\nt_s = {{ from = \"t\", factor = 0 }}\n{}", released("level = true")), 2, vec!["line 2", "factor"]),
+    ] {
+        write("x.toml", &toml);
+        let output = sfers(folder.path(), &["diagnose", "x.toml", "--out", "d"]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{toml}: {text}");
+        assert!(words.iter().all(|word| text.contains(word)), "{words:?} in {text}\n{toml}");
+        assert!(!folder.path().join("d").exists(), "{toml}");
+    }
+}
+
+#[test]
+fn frames_loops_responses_and_equilibria_are_checked_and_named_with_their_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("a.csv", "v1_v,tip_z_mm\n0,1\n10,1\n10,2\n");
+    write("frames.csv", "frame,v1_v,tip_z_mm\n0,0,1\n1,0,1\n");
+    let response =
+        "[[frequency_response]]\nid = \"r\"\nfile = \"r.csv\"\ncoordinate = \"tip_z\"\namplitude_v = 10\nsigma_mm = 0.1\n";
+    let steady = "[[steady]]\nvoltages_v = [-100]\ntip_z_mm = 1\n";
+    let good = "f_hz,amplitude_mm,phase_deg\n1,0.1,0\n2,0.1,0\n";
+    for (toml, csv, code, words) in [
+        (format!("{HEAD}{RUN}"), good, 3, vec!["a.csv, line 1", "t_s is missing", "rate_v_per_s"]),
+        (format!("{HEAD}{RUN}rate_v_per_s = 5\n"), good, 3, vec!["a.csv, line 4", "row before", "keep one"]),
+        (format!("{HEAD}{RUN}rate_v_per_s = -5\n"), good, 2, vec!["line 11", "rate_v_per_s", "-5"]),
+        (
+            format!("{HEAD}{RUN}rate_v_per_s = 5\n").replace("a.csv", "frames.csv"),
+            good,
+            3,
+            vec!["frames.csv, line 1, column 1", "rate_v_per_s"],
+        ),
+        (format!("{HEAD}{RUN}").replace("a.csv", "frames.csv"), good, 3, vec!["line 1, column 1", "frame_rate_hz"]),
+        (format!("{HEAD}[camera]\nframe_rate_hz = 0\n{RUN}"), good, 2, vec!["line 9", "frame_rate_hz", "above 0"]),
+        (
+            format!("{HEAD}[camera]\nframe_rate_hz = 100\nexposure_ms = 11\n{RUN}"),
+            good,
+            2,
+            vec!["line 10", "exposure_ms", "10, the time between"],
+        ),
+        (format!("{HEAD}{response}"), "f_hz,amplitude_mm,phase\n", 3, vec!["r.csv, line 1, column 3", "phase_deg or phase_rad"]),
+        (format!("{HEAD}{response}"), "f_hz,amplitude_mm\n1,1\n", 3, vec!["r.csv, line 1", "phase_deg"]),
+        (format!("{HEAD}{response}"), "f_hz,amplitude_mm,phase_deg\n2,1,1\n1,1,1\n", 3, vec!["r.csv, line 3, column 1", "rise"]),
+        (format!("{HEAD}{response}"), "f_hz,amplitude_mm,phase_deg\n1,-1,0\n", 3, vec!["r.csv, line 2, column 2", "-1"]),
+        (format!("{HEAD}{response}"), "f_hz,amplitude_mm,phase_deg\n1,x,0\n", 3, vec!["r.csv, line 2, column 2", "\"x\""]),
+        (format!("{HEAD}{response}"), "f_hz,amplitude_mm,phase_deg\n", 3, vec!["r.csv, line 1", "no rows"]),
+        (format!("{HEAD}{response}{response}"), good, 3, vec!["two runs"]),
+        (format!("{HEAD}{response}").replace("tip_z", "tip_y"), good, 2, vec!["line 11", "coordinate", "tip_y", "tip_z"]),
+        (format!("{HEAD}{response}").replace("_v = 10", "_v = -10"), good, 2, vec!["line 12", "amplitude_v", "-10"]),
+        (format!("{HEAD}{response}").replace("_v = 10", "_v = 9000"), good, 2, vec!["line 12", "amplitude_v", "9000 V"]),
+        (format!("{HEAD}{response}").replace("clamped", "free"), good, 2, vec!["clamped"]),
+        (format!("{HEAD}{steady}").replace("[-100]", "[-100, 0]"), good, 2, vec!["line 9", "voltages_v", "2 values for 1"]),
+        (format!("{HEAD}{steady}").replace("tip_z_mm", "tip_z"), good, 2, vec!["line 10", "tip_z", "tip_z_mm"]),
+        (format!("{HEAD}{steady}").replace("tip_z_mm = 1\n", ""), good, 2, vec!["line 9", "without a position", "tip_z_mm"]),
+        (format!("{HEAD}{steady}sigma_mm = 0\n"), good, 2, vec!["line 11", "sigma_mm"]),
+    ] {
+        write("x.toml", &toml);
+        write("r.csv", csv);
+        let output = sfers(folder.path(), &["diagnose", "x.toml", "--out", "d"]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{toml}{csv}: {text}");
+        assert!(words.iter().all(|word| text.contains(word)), "{words:?} in {text}\n{toml}");
+        assert!(!folder.path().join("d").exists(), "{toml}");
+    }
+}
+
+#[test]
 fn one_run_is_too_little_to_decide_and_the_diagnosis_says_so() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("x.toml"), format!("{HEAD}{RUN}")).unwrap();

@@ -68,6 +68,7 @@ impl Bent {
                 inputs: times.iter().map(|t| input(*drive, *t)).collect(),
                 times,
                 channels: vec![0; ROWS],
+                ..Signal::default()
             });
         }
         Self { signals, candidates: candidates() }

@@ -260,6 +260,29 @@ fn chains_tend_to_the_beam_of_euler_and_bernoulli() {
     assert!(errors[2].iter().all(|error| error.abs() < 0.01), "{errors:?}");
 }
 
+/// Moments about every joint. From 200 times the weight on, which bends the tip down by 8 cm of 10, whole steps overshoot.
+#[test]
+fn a_robot_settles_where_its_stiffness_bears_its_weight() {
+    let mut experiment = passive("actuators = 1\nmotors_per_actuator = 6\nmount = \"clamped\"\ndamping_eta = 0.008");
+    let gravity = experiment.robot.material.gravity;
+    for times in [1.0, 10.0, 100.0, 200.0, 500.0] {
+        experiment.robot.material.gravity = times * gravity;
+        let robot = &experiment.robot;
+        let mut engine = engine(&experiment, 1e-4);
+        engine.settle(&[0.0]).unwrap_or_else(|error| panic!("{times}: {error}"));
+        let mut nodes = vec![0.0; 3 * 8];
+        engine.nodes(&mut nodes, &mut vec![0.0; 3 * 8]).unwrap();
+        engine.prepare(&[0.0]).unwrap();
+        for (joint, angle) in engine.joints().angles.iter().enumerate() {
+            let distal = robot.segments().into_iter().enumerate().skip(joint + 1);
+            let arm = |body: usize| 0.5 * (nodes[3 * body] + nodes[3 * body + 3]) - nodes[3 * joint + 3];
+            let moment: f64 = distal.map(|(body, segment)| segment.mass * robot.material.gravity * arm(body)).sum();
+            let bent = robot.joint().stiffness * angle;
+            assert!((bent / moment - 1.0).abs() < 1e-9, "{times} times the weight, joint {joint}: {bent} {moment}");
+        }
+    }
+}
+
 fn engine_angle(engine: &mut PlanarEngine) -> f64 {
     engine.prepare(&[0.0]).unwrap();
     engine.joints().angles[0]

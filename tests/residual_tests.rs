@@ -63,14 +63,7 @@ fn alarms(case: &Case, seed: u64) -> BTreeMap<String, usize> {
         let (mut signals, mut used, mut residuals) = (Vec::new(), Vec::new(), Vec::new());
         for run in 0..RUNS {
             let swing = 400.0 + 300.0 * run as f64;
-            let mut signal = Signal {
-                id: run.to_string(),
-                values: Vec::new(),
-                sigmas: Vec::new(),
-                times: Vec::new(),
-                channels: Vec::new(),
-                inputs: Vec::new(),
-            };
+            let mut signal = Signal { id: run.to_string(), ..Signal::default() };
             let (mut mask, mut left) = (Vec::new(), Vec::new());
             let times: Vec<f64> =
                 (0..case.rows).map(|i| 0.01 * (i as f64 + case.uneven * (random.uniform() - 0.5))).map(|t| t.max(0.0)).collect();

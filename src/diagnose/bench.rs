@@ -147,6 +147,17 @@ impl Columns {
         Self { plain, columns, gram, channels: count, base }
     }
 
+    /// Without the kinds for which `has` is false: their columns are zero.
+    pub fn only(mut self, has: impl Fn(usize) -> bool) -> Self {
+        for column in (0..self.columns.len()).filter(|column| !has(kind(*column, self.channels))) {
+            self.plain[column].fill(0.0);
+            self.columns[column].fill(0.0);
+            self.gram.row_mut(column).fill(0.0);
+            self.gram.column_mut(column).fill(0.0);
+        }
+        self
+    }
+
     /// Residuals at the base values `base` as those about 0, to first order.
     fn about_zero(&self, base: [f64; BASED], residuals: &mut [f64]) {
         for (base, column) in base.iter().zip(&self.columns).filter(|(base, _)| **base != 0.0) {
@@ -408,6 +419,19 @@ mod tests {
                 assert!(if truth == 0.0 { *sd == 0.0 } else { (0.5..2.0).contains(&(sd / truth)) }, "seed {seed}: {sds:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_kind_that_a_run_cannot_have_is_neither_found_nor_taken_from_its_residuals() {
+        let sds = Spread { of: [4e-3, 1e-3, 0.01, 0.0, 0.2, 0.1] };
+        let no_clock = |kind| ![Spread::CLOCK, Spread::RATE, Spread::DRIFT].contains(&kind);
+        let own = columns(3.0).only(no_clock);
+        let mut random = Random::new(4);
+        let r: Vec<f64> = columns(3.0).columns[Spread::CLOCK].iter().map(|g| 4e-3 * g + random.normal()).collect();
+        for fault in own.found(&sds, &r) {
+            assert!(no_clock(fault.kind) || (fault.value == 0.0 && fault.sd == sds.of[fault.kind]), "{fault:?}");
+        }
+        assert!(columns(3.0).found(&sds, &r)[0].value > 2e-3);
     }
 
     #[test]

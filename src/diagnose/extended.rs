@@ -3,7 +3,7 @@
 //! The experiment has the time steps of the fit, so that `sfers run` reproduces the prediction: rows that fall on steps are recorded, the others lie
 //! between recorded steps.
 
-use super::dataset::Dataset;
+use super::dataset::{Dataset, Start};
 use super::fit::sum_of_squares;
 use super::pipeline::Outcome;
 use super::plant::{Model, Plant};
@@ -31,7 +31,9 @@ impl Files {
     pub fn new(dataset: &Dataset, plant: &RobotPlant, outcome: &Outcome) -> Self {
         let chi2 = |run: &usize| sum_of_squares(&outcome.calibrated.residuals[*run]);
         let all = outcome.split.all();
-        let run = all.iter().copied().max_by(|a, b| chi2(a).total_cmp(&chi2(b))).unwrap_or(0);
+        // A run in time, if there is one.
+        let of_time = |run: &usize| dataset.runs[*run].times.len() > 1;
+        let run = all.iter().copied().max_by(|a, b| of_time(a).cmp(&of_time(b)).then(chi2(a).total_cmp(&chi2(b)))).unwrap_or(0);
         let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run].shares);
         Self { experiment, drive, residuals: residuals(plant, outcome) }
     }
@@ -48,7 +50,8 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
             .chain(rows.map(|(row, t)| std::iter::once(t).chain(table.row(row)).map(|x| format!("{x:?}")).collect())),
     );
 
-    let mut config = dataset.nominal.clone();
+    let measured = &dataset.runs[run];
+    let mut config = measured.nominal.clone();
     // The table's positive voltages include the gain.
     config.robot.positive_gain = None;
     config.drive = DriveConfig { waveform: Some("csv".into()), file: Some("drive.csv".into()), ..DriveConfig::default() };
@@ -74,7 +77,7 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
     let mount = plant.robot().mount;
     config.simulation = SimulationConfig {
         engine: Some("planar".into()),
-        start: Some("settled".into()),
+        start: Some(if measured.start == Start::Level { "flat" } else { "settled" }.into()),
         numerical_damping_per_s: (mount == Mount::Clamped).then_some(NUMERICAL_DAMPING),
         time_step_s: Some(StepConfig::Seconds(step)),
         steps: Some(steps),
@@ -84,8 +87,14 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
     };
     let toml = toml::to_string(&config).unwrap_or_else(|error| format!("# cannot be written: {error}\n"));
     // Names may hold line breaks, comments may not.
+    let other_start = match measured.start {
+        Start::Hung(_) | Start::Held { .. } => {
+            "# The run is released from another shape; an experiment starts in equilibrium or flat.\n"
+        }
+        Start::Settled | Start::Level => "",
+    };
     let head = format!(
-        "# The nominal model of {} with what its diagnosis found, under the drive of run {}.\n# Its time 0 is t_s = {:?} of the run.\n",
+        "# The nominal model of {} with what its diagnosis found, under the drive of run {}.\n# Its time 0 is t_s = {:?} of the run.\n{other_start}",
         dataset.name.escape_debug(),
         plant.signals()[run].id.escape_debug(),
         plant.start(run)

@@ -27,7 +27,8 @@ pub(super) fn found(estimator: &Estimator, model: &Model) -> Result<Vec<BenchFau
     let of = |kind: usize| {
         let (id, unit, factor) = NAMES[kind];
         let mut all = Vec::new();
-        for (signal, faults) in plant.signals().iter().zip(&runs) {
+        let signals = plant.signals().iter().zip(&runs).enumerate().filter(|(run, _)| plant.has_fault(*run, kind));
+        for (_, (signal, faults)) in signals {
             all.extend(faults.iter().filter(|fault| fault.kind == kind).map(|fault| RunFault {
                 run: signal.id.clone(),
                 channel: fault.channel.and_then(|channel| channels.get(channel).cloned()),

@@ -456,12 +456,15 @@ impl<'a> Estimator<'a> {
                 Ok(after.iter().zip(&*before).map(|(b, a)| (b - a) / (2.0 * half)).collect())
             };
             let now = self.predict(model, run, nuisance)?;
-            let rate = derivative(Spread::CLOCK, HALF_STEP)?;
+            let has_clock = [Spread::CLOCK, Spread::RATE].into_iter().any(|kind| plant.has_fault(run, kind));
+            let rate = if has_clock { derivative(Spread::CLOCK, HALF_STEP)? } else { vec![0.0; now.len()] };
             let by_gain = derivative(Spread::GAIN, HALF_GAIN)?;
             let weights: Vec<f64> =
                 signal.sigmas.iter().zip(&self.used[run]).map(|(sigma, used)| if *used { 1.0 / sigma } else { 0.0 }).collect();
             let whiten = |column: &mut [f64]| self.noise.whiten(signal, &self.used[run], column);
-            Ok(Columns::new(&signal.channels, &signal.times, [&now[..], &rate, &by_gain], &weights, nuisance.base, whiten))
+            let columns =
+                Columns::new(&signal.channels, &signal.times, [&now[..], &rate, &by_gain], &weights, nuisance.base, whiten);
+            Ok(columns.only(|kind| plant.has_fault(run, kind)))
         };
         let columns: Vec<Columns> = (0..plant.signals().len()).into_par_iter().map(columns).collect::<Result<_, _>>()?;
         self.faults = columns;

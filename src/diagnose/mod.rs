@@ -37,6 +37,7 @@ mod random;
 #[cfg(feature = "view")]
 pub mod report;
 pub mod residual_tests;
+mod response;
 pub mod robot;
 mod run_csv;
 pub mod search;

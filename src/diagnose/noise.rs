@@ -10,6 +10,8 @@
 //!
 //! and residuals are whitened by the innovations of the Kalman filter of this process, which is linear in them and exact for uneven rows.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{DMatrix, DVector};
 
 use super::plant::Signal;
@@ -130,7 +132,7 @@ fn without_trend(times: &[f64], values: &[f64], period: Option<f64>) -> Option<(
 
 fn rests(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) -> Vec<Rest> {
     let mut all = Vec::new();
-    for ((signal, used), residuals) in signals.iter().zip(used).zip(residuals) {
+    for ((signal, used), residuals) in signals.iter().zip(used).zip(residuals).filter(|((signal, _), _)| !signal.is_spectrum) {
         let channels = signal.channels.iter().max().map_or(0, |last| last + 1);
         for channel in 0..channels {
             let rows: Vec<usize> = (0..signal.values.len()).filter(|i| signal.channels[*i] == channel && used[*i]).collect();
@@ -180,11 +182,11 @@ pub fn estimate(signals: &[Signal], used: &[Vec<bool>], residuals: &[Vec<f64>]) 
     }
     let typical: Vec<&Rest> = rests.iter().filter(|rest| variance(rest) <= 2.0 * levels[rest.channel].unwrap_or(mean)).collect();
     let (correlated, time_s) = correlation(&typical)?;
-    let noise = |levels: &[Option<f64>]| Noise {
-        factors: levels.iter().map(|level| level.unwrap_or(mean).sqrt()).collect(),
-        correlated,
-        time_s,
-    };
+    // Those of frequency responses keep the given level.
+    let spectra: BTreeSet<usize> = signals.iter().filter(|s| s.is_spectrum).flat_map(|s| s.channels.iter().copied()).collect();
+    let factor =
+        |(channel, level): (usize, &Option<f64>)| if spectra.contains(&channel) { 1.0 } else { level.unwrap_or(mean).sqrt() };
+    let noise = |levels: &[Option<f64>]| Noise { factors: levels.iter().enumerate().map(factor).collect(), correlated, time_s };
     if correlated == 0.0 {
         return Some(noise(&levels));
     }
@@ -213,7 +215,7 @@ fn correlation(rests: &[&Rest]) -> Option<(f64, f64)> {
         }
     }
     // Means over a third of an octave.
-    let mut bins: std::collections::BTreeMap<i32, [f64; 2]> = std::collections::BTreeMap::new();
+    let mut bins: BTreeMap<i32, [f64; 2]> = BTreeMap::new();
     for [lag, value, weight] in &points {
         let bin = bins.entry((3.0 * lag.log2()).floor() as i32).or_default();
         bin[0] += weight * value;
@@ -266,6 +268,9 @@ impl Noise {
         let (mut filter, mut before) = (Filter::new(self.correlated, self.time_s), None);
         for (i, r) in residuals.iter_mut().enumerate().take(signal.values.len()) {
             let (channel, t) = (signal.channels[i], signal.times[i]);
+            if signal.is_spectrum {
+                continue;
+            }
             *r /= self.factors[channel];
             if self.correlated == 0.0 || !used[i] {
                 continue;
@@ -365,6 +370,31 @@ mod tests {
         let neighbours = white.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / 1000.0;
         // Three standard errors of 1000 independent values.
         assert!((mean_square - 1.0).abs() < 3.0 * 0.045 && neighbours.abs() < 3.0 * 0.032, "{mean_square} {neighbours}");
+    }
+
+    #[test]
+    fn a_frequency_response_has_the_noise_that_it_is_given() {
+        let (mut signals, mut used, mut residuals) = data(|_, _, random, _| 2.0 * random.normal());
+        let without = estimate(&signals, &used, &residuals).unwrap();
+        // What a model lacks at constant amplitude would pass for noise of 0.5 σ.
+        let channels = vec![1; 200];
+        let inputs = vec![100.0; 200];
+        signals.push(Signal {
+            times: signals[0].times[..200].to_vec(),
+            values: inputs.clone(),
+            channels,
+            inputs,
+            is_spectrum: true,
+            ..Signal::default()
+        });
+        used.push(vec![true; 200]);
+        residuals.push((0..200).map(|k| 0.7 * f64::from(k % 7 - 3).signum()).collect());
+        let noise = estimate(&signals, &used, &residuals).unwrap();
+        assert_eq!((noise.factors[0], noise.factors[1]), (without.factors[0], 1.0));
+        let exact = Noise { factors: vec![2.0, 1.0], correlated: 0.5, time_s: 0.03 };
+        let mut own = residuals[4].clone();
+        exact.whiten(&signals[4], &used[4], &mut own);
+        assert_eq!(own, residuals[4]);
     }
 
     #[test]

@@ -502,7 +502,7 @@ fn insufficient_data(plant: &dyn Plant, split: &Split) -> Option<String> {
     }
     let is_constant = |run: &usize| {
         let inputs = &signals[*run].inputs;
-        inputs.iter().all(|u| (u - inputs[0]).abs() < 1e-9)
+        !plant.moves_unaided(*run) && inputs.iter().all(|u| (u - inputs[0]).abs() < 1e-9)
     };
     let levels: Vec<f64> = signals.iter().filter_map(|signal| signal.inputs.first().copied()).collect();
     if split.all().iter().all(is_constant) && levels.iter().all(|level| (level - levels[0]).abs() < 1e-9) {

@@ -131,6 +131,8 @@ pub struct Signal {
     pub channels: Vec<usize>,
     /// Input of the first actuator at the time of each value (V for robots).
     pub inputs: Vec<f64>,
+    /// True for a frequency response: `times` are frequencies (Hz), and the noise is white, of the given level.
+    pub is_spectrum: bool,
 }
 
 /// A system that was measured in runs and can be simulated.
@@ -157,9 +159,19 @@ pub trait Plant: Sync {
         0
     }
 
+    /// True for a run that moves under a constant input, as one that is released from another shape than its equilibrium.
+    fn moves_unaided(&self, _run: usize) -> bool {
+        false
+    }
+
     /// Standard deviations of the bench's faults that are known, in the order of [`Spread::of`]; the others are estimated.
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         [None; bench::KINDS]
+    }
+
+    /// True if a run can have faults of a kind, an index of [`Spread::of`]; one without times of its own has no clock and no drift.
+    fn has_fault(&self, _run: usize, _kind: usize) -> bool {
+        true
     }
 
     /// True if a term exceeds the error of the discretisation.

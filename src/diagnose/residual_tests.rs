@@ -201,6 +201,10 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], resi
         let m = trace.values.len();
         let lag = correlation(&trace.values[..m - 1], &trace.values[1..]);
         add("correlation of neighbours", lag, correlation_limit(m - 1), "white", "neighbours are alike: structure is left");
+        gains.extend(gain(signal, used, r));
+        if signal.is_spectrum {
+            continue;
+        }
         let along = correlation(&trace.values, &trace.inputs);
         let limit = correlation_limit(m);
         add("correlation with the input", along, limit, "independent of the input", "follows the input: a gain is off");
@@ -234,7 +238,6 @@ pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], resi
             let (area, limit) = loop_area(&trace);
             add("loop area", area, limit, "no loop over the input", "a loop over the input: loss, lag or memory");
         }
-        gains.extend(gain(signal, used, r));
     }
     if runs >= 3 {
         let trend = trend(&gains);
@@ -270,6 +273,8 @@ fn gain(signal: &Signal, used: &[bool], residuals: &[f64]) -> Option<[f64; 3]> {
             high = high.max(signal.inputs[*i]);
         }
     }
+    // The input of a frequency response is its amplitude.
+    let low = if signal.is_spectrum { -high } else { low };
     (spread > 0.0).then(|| [high - low, 1.0 + product / spread, spread])
 }
 
@@ -329,6 +334,11 @@ pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals:
         let n = trace.values.len();
         let m = mean(&trace.values);
         let rms = (trace.values.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt();
+        if signals[*run].is_spectrum {
+            let largest = trace.times.iter().zip(&trace.values).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+            words.extend(largest.map(|(frequency, size)| format!("{id}: largest at {frequency:.3} Hz, {:.1} σ", size.abs())));
+            continue;
+        }
         // The peak of the periodogram up to a quarter of the sampling rate.
         let span = trace.times[n - 1] - trace.times[0];
         let top = (0.25 * n as f64) as usize;

@@ -5,15 +5,16 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
-use super::dataset::{Bench, Dataset};
+use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
 use super::plant::{Candidate, FreeCurve, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
+use super::response::Sine;
 use super::track::{ON_STEP, track};
-use super::visited::visited;
+use super::visited::{Visit, visited};
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
-use crate::effects::{self, Applied, EffectError, SignalChain, View};
+use crate::effects::{self, Applied, EffectError, Kind, SignalChain, View};
 use crate::model::{Mount, PointMass, Robot};
 
 /// Joints per actuator that are tried; more change a cantilever's first frequency by less than 0.06 %.
@@ -24,6 +25,13 @@ const JOINTS_ON_THE_FLOOR: usize = 8;
 const STEPS_PER_PERIOD: f64 = 220.0;
 /// Time step of a robot on the ground (s), short enough for impacts.
 const GROUND_STEP: f64 = 1e-4;
+/// Kinds of effects that do nothing at 0 V.
+const ON_VOLTAGES: [Kind; 2] = [Kind::Driver, Kind::Actuation];
+/// Time steps in a period of a frequency response.
+const ROWS_PER_PERIOD: f64 = 40.0;
+/// Nodes and weights of Gauss's rule for the mean over an interval of length 1 about 0: exact for a motion of fifth degree in time.
+const OF_EXPOSURE: [[f64; 2]; 3] =
+    [[-0.387_298_334_620_741_7, 5.0 / 18.0], [0.0, 8.0 / 18.0], [0.387_298_334_620_741_7, 5.0 / 18.0]];
 /// Largest change of a run's prediction by a longer time step (rms, in σ).
 const LARGEST_CHANGE: f64 = 0.15;
 
@@ -43,95 +51,148 @@ pub struct Scene {
     pub markers: Vec<f64>,
 }
 
+/// A run to be simulated.
+struct Run {
+    robot: Robot,
+    /// Marker positions along the robot (cm).
+    markers: Vec<f64>,
+    command: Command,
+    start: Start,
+    /// Time at which it starts (s).
+    origin: f64,
+    /// Time from there to its last row (s).
+    duration: f64,
+    /// Time step (s).
+    step: f64,
+    /// Factor on positive voltages (–).
+    positive_gain: f64,
+    /// False where times were made of voltages: rows then have no clock that could be off.
+    has_clock: bool,
+    /// The frequency response that it is, if it is none in time.
+    response: Option<Response>,
+}
+
 /// A data set with its robot.
 pub struct RobotPlant {
     robot: Robot,
     /// Marker positions along the robot (cm).
     markers: Vec<f64>,
     channels: Vec<String>,
-    commands: Vec<Command>,
+    runs: Vec<Run>,
     signals: Vec<Signal>,
-    /// Time of each run's first row (s).
-    starts: Vec<f64>,
-    /// Length of each run (s).
-    durations: Vec<f64>,
-    /// Time step of each run (s).
-    steps: Vec<f64>,
     candidates: Vec<Candidate>,
     bench: Bench,
+    /// Time over which a frame takes the mean of the motion (s).
+    exposure: f64,
+    /// True if there is no voltage in any run.
+    without_voltage: bool,
 }
 
 impl RobotPlant {
     /// The plant of a data set, with the noise and masks that [`quality::check`] returned for it.
     pub fn new(dataset: &Dataset, checked: &quality::Checked) -> Self {
-        let robot = dataset.robot.clone();
-        let gain = dataset.nominal.robot.positive_gain.unwrap_or(1.0);
-        let (mut commands, mut signals, mut starts, mut steps) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let n = dataset.robot.actuators;
+        let (mut runs, mut signals) = (Vec::new(), Vec::new());
+        let responses = dataset.response_channels();
         for (run, masks) in dataset.runs.iter().zip(&checked.runs) {
-            let n = robot.actuators;
-            let start = run.times[0];
-            let times: Vec<f64> = run.times.iter().map(|t| t - start).collect();
-            let volts: Vec<f64> = run.voltages.iter().map(|v| if *v > 0.0 { v * gain } else { *v }).collect();
-            commands.push(Command::new(&times, &volts, n));
-            let mut signal = Signal {
-                id: run.id.clone(),
-                values: Vec::new(),
-                sigmas: Vec::new(),
-                times: Vec::new(),
-                channels: Vec::new(),
-                inputs: Vec::new(),
-            };
+            let robot = run.robot.clone();
+            let gain = run.nominal.robot.positive_gain.unwrap_or(1.0);
+            let times: Vec<f64> = run.times.iter().map(|t| t - run.origin).collect();
+            let (command_times, volts) = run.command();
+            let command_times: Vec<f64> = command_times.iter().map(|t| t - run.origin).collect();
+            let volts: Vec<f64> = volts.iter().map(|v| if *v > 0.0 { v * gain } else { *v }).collect();
+            let command = Command::new(&command_times, &volts, n);
+            let mut signal = Signal { id: run.id.clone(), is_spectrum: run.response.is_some(), ..Signal::default() };
             for (channel, (column, usable)) in run.channels.iter().zip(masks).enumerate() {
                 for (row, value) in column.iter().enumerate().filter(|(row, _)| usable[*row]) {
                     signal.values.push(*value);
-                    signal.sigmas.push(checked.noise[channel]);
+                    signal.sigmas.push(run.sigma.unwrap_or(checked.noise[channel]));
                     signal.times.push(times[row]);
                     signal.channels.push(channel);
                     signal.inputs.push(run.voltages[row * n]);
                 }
             }
+            let mut longest = step(&robot, &times);
+            if let Some(Response { frequencies, channel, amplitude, parts, .. }) = &run.response {
+                // In-phase and quadrature parts are channels of their own, with frequencies for times.
+                let first = 2 * dataset.markers.len() + 2 * responses.iter().take_while(|other| *other < channel).count();
+                for (part, (frequency, values)) in
+                    [0, 1].into_iter().flat_map(|k| frequencies.iter().zip(parts).map(move |row| (k, row)))
+                {
+                    signal.values.push(values[part]);
+                    signal.sigmas.push(run.sigma.unwrap_or(checked.noise[*channel]));
+                    signal.times.push(*frequency);
+                    signal.channels.push(first + part);
+                    signal.inputs.push(*amplitude);
+                }
+                longest = longest.min(1.0 / (ROWS_PER_PERIOD * frequencies[frequencies.len() - 1]));
+            }
             signals.push(signal);
-            starts.push(start);
-            steps.push(step(&robot, &times));
+            runs.push(Run {
+                step: longest,
+                robot,
+                markers: run.positions.clone(),
+                command,
+                start: run.start,
+                origin: run.origin,
+                duration: times[times.len() - 1],
+                positive_gain: gain,
+                has_clock: run.has_clock,
+                response: run.response.clone(),
+            });
+        }
+        let is_at_zero = |run: &MeasuredRun| run.response.is_none() && run.command().1.iter().all(|v| *v == 0.0);
+        let without_voltage = dataset.runs.iter().all(is_at_zero);
+        let mut channels = dataset.channel_names();
+        for channel in responses {
+            channels.extend(["in phase", "in quadrature"].map(|part| format!("{} {part}", channels[channel])));
         }
         let plant = Self {
+            robot: dataset.robot.clone(),
             markers: dataset.markers.iter().map(|marker| marker.position).collect(),
-            channels: dataset.channel_names(),
-            robot,
-            commands,
+            channels,
+            runs,
             signals,
-            starts,
-            durations: dataset.runs.iter().map(|run| run.times[run.times.len() - 1] - run.times[0]).collect(),
-            steps,
             candidates: Vec::new(),
             bench: dataset.bench,
+            exposure: 1e-3 * dataset.camera.exposure_ms.unwrap_or(0.0),
+            without_voltage,
         };
         plant.with_chosen_steps().with_candidates()
     }
 
     /// Sets the candidates, free forms on the ranges that the runs visit.
     fn with_candidates(mut self) -> Self {
-        let run = |run: usize| {
-            let table = self.commands[run].table(&vec![1.0; self.nuisances(run)], 0.0);
-            (table, self.steps[run], self.steps_of(run, self.steps[run]))
+        let visit = |run: usize| {
+            let Run { robot, start, command, step, .. } = &self.runs[run];
+            let drive = command.table(&vec![1.0; self.nuisances(run)], 0.0);
+            Visit { robot, start, drive, step: *step, steps: self.steps_of(run, *step) }
         };
-        let runs: Vec<_> = (0..self.signals.len()).map(run).collect();
+        let visits: Vec<_> = (0..self.runs.len()).map(visit).collect();
         let bench = effects::Bench::new(&self.robot, self.markers.len());
         // A nominal model that cannot be simulated is reported by the first prediction.
-        self.candidates = visited(&self.robot, &runs).map_or(Vec::new(), |visited| candidates(&bench, &visited));
+        let mut all = visited(&visits).map_or(Vec::new(), |visited| candidates(&bench, &visited));
+        if self.without_voltage {
+            // What acts on voltages does nothing without any.
+            all.retain(|c| {
+                effects::find(c.id).is_none_or(|effect| !ON_VOLTAGES.contains(&effect.kind)) && c.id != "actuation-gain"
+            });
+        }
+        self.candidates = all;
         self
     }
 
     /// Sets each run's time step to the longest that keeps its prediction within [`LARGEST_CHANGE`].
     fn with_chosen_steps(mut self) -> Self {
-        let runs = 0..self.signals.len();
-        self.steps = runs.into_par_iter().map(|run| self.longest_step(run)).collect();
+        let steps: Vec<f64> = (0..self.runs.len()).into_par_iter().map(|run| self.longest_step(run)).collect();
+        self.runs.iter_mut().zip(steps).for_each(|(run, step)| run.step = step);
         self
     }
 
     fn longest_step(&self, run: usize) -> f64 {
-        let finest = self.steps[run];
-        let limit = 0.09 / (analytic::cantilever_frequency(&self.robot) * (self.robot.actuators as f64).powi(2));
+        let Run { robot, step: finest, .. } = &self.runs[run];
+        let finest = *finest;
+        let limit = 0.09 / (analytic::cantilever_frequency(robot) * (robot.actuators as f64).powi(2));
         let ends = Nuisance { shares: vec![1.0; self.nuisances(run)], ..Nuisance::default() };
         let with = |step: f64| self.predict_with(&[], self.robot.motors_per_actuator as f64, run, &ends, step).ok();
         let (Some(fine), Mount::Clamped) = (with(finest), self.robot.mount) else { return finest };
@@ -151,22 +212,22 @@ impl RobotPlant {
 
     /// The time step (s) of a run.
     pub fn step(&self, run: usize) -> f64 {
-        self.steps[run]
+        self.runs[run].step
     }
 
-    /// The time (s) of a run's first row.
+    /// The time (s) at which a run starts, on the clock of its file.
     pub fn start(&self, run: usize) -> f64 {
-        self.starts[run]
+        self.runs[run].origin
     }
 
     /// The number of steps of `step` (s) that a run takes: one beyond its last row, so that the state there is recorded.
     pub fn steps_of(&self, run: usize, step: f64) -> u64 {
-        (self.durations[run] / step - ON_STEP).ceil().max(0.0) as u64 + 1
+        (self.runs[run].duration / step - ON_STEP).ceil().max(0.0) as u64 + 1
     }
 
     /// The command of a run.
     pub fn command(&self, run: usize) -> &Command {
-        &self.commands[run]
+        &self.runs[run].command
     }
 
     /// Marker positions along the robot (cm).
@@ -196,8 +257,9 @@ impl RobotPlant {
         let Setup { robot, drive, chain, view } =
             self.setup(robot, &model.terms, model.resolution, scene.drive.clone(), scene.duration)?;
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
-        let step = self.steps.iter().copied().fold(1e-3, f64::min);
-        let tracks = track(&robot, scene.hung, &drive, chain, step, &scene.markers, &times)?;
+        let step = self.runs.iter().map(|run| run.step).fold(1e-3, f64::min);
+        let start = if scene.hung > 0.0 { Start::Hung(scene.hung) } else { Start::Settled };
+        let tracks = track(&robot, &start, &drive, chain, step, &scene.markers, &times)?;
         Ok(tracks.into_iter().flat_map(|at| view.of(at).map(|x| 10.0 * x)).collect())
     }
 
@@ -253,13 +315,39 @@ impl Plant for RobotPlant {
     }
 
     fn nuisances(&self, run: usize) -> usize {
-        self.commands[run].jumps().len()
+        self.runs[run].command.jumps().len()
+    }
+
+    fn moves_unaided(&self, run: usize) -> bool {
+        self.runs[run].start != Start::Settled || self.runs[run].response.is_some()
     }
 
     fn bench(&self) -> [Option<f64>; bench::KINDS] {
         let Bench { clock_ms, zero_mm, gain, drift_mm_per_s } = self.bench;
-        // A given gain is that of the voltage; the camera's scale then has none of its own.
-        [clock_ms.map(|ms| 1e-3 * ms), None, gain, gain.map(|_| 0.0), zero_mm, drift_mm_per_s]
+        let clock = clock_ms.map(|ms| 1e-3 * ms);
+        let mut given = if self.without_voltage {
+            // There is no gain, and no second clock: its offset is that of the release.
+            [clock, Some(0.0), Some(0.0), gain, zero_mm, drift_mm_per_s]
+        } else {
+            // A given gain is that of the voltage; the camera's scale then has none of its own.
+            [clock, None, gain, gain.map(|_| 0.0), zero_mm, drift_mm_per_s]
+        };
+        for (kind, given) in given.iter_mut().enumerate() {
+            if !(0..self.runs.len()).any(|run| self.has_fault(run, kind)) {
+                *given = Some(0.0);
+            }
+        }
+        given
+    }
+
+    fn has_fault(&self, run: usize, kind: usize) -> bool {
+        let Run { response, has_clock, duration, .. } = &self.runs[run];
+        match kind {
+            // An analyser takes its sines out of zero and drift, on one clock, with one scale.
+            _ if response.is_some() => kind == Spread::GAIN,
+            Spread::CLOCK | Spread::RATE | Spread::DRIFT => *has_clock && *duration > 0.0,
+            _ => true,
+        }
     }
 
     /// A constant counts only beyond the error of the discretisation: 1/(2m²) of the stiffness for m joints, six times that of the damping, and
@@ -327,22 +415,66 @@ impl RobotPlant {
         nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let table = self.commands[run].table(&nuisance.shares, nuisance.base[Spread::GAIN]);
+        let Run { robot, markers, command, start, response, has_clock, .. } = &self.runs[run];
+        if let Some(response) = response {
+            return self.respond(response, &self.runs[run], terms, resolution, nuisance, step);
+        }
+        let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
         let Setup { robot, drive, chain, view } =
-            self.setup(self.robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
+            self.setup(robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
         // Channels share their times.
         let mut times = signal.times.clone();
         times.sort_by(f64::total_cmp);
         times.dedup();
-        let seen: Vec<f64> = times.iter().map(|t| (nuisance.time(*t) - view.delay).max(0.0)).collect();
-        let tracks = track(&robot, 0.0, &drive, chain, step, &self.markers, &seen)?;
-        let n = self.markers.len();
+        let rule: &[[f64; 2]] = if self.exposure > 0.0 { &OF_EXPOSURE } else { &[[0.0, 1.0]] };
+        // Times at which positions are needed, with their rows and weights.
+        let at_row = |(row, t): (usize, &f64)| {
+            let middle = if *has_clock { nuisance.time(*t) } else { *t } - view.delay;
+            rule.iter().map(move |[node, weight]| ((middle + node * self.exposure).max(0.0), row, *weight))
+        };
+        let mut seen: Vec<(f64, usize, f64)> = times.iter().enumerate().flat_map(at_row).collect();
+        // Frames may overlap where rows are closer than an exposure.
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let tracks = track(&robot, start, &drive, chain, step, markers, &seen.iter().map(|(t, ..)| *t).collect::<Vec<_>>())?;
+        let n = markers.len();
+        let mut positions = vec![[0.0; 2]; times.len() * n];
+        for ((_, row, weight), at) in seen.iter().zip(tracks.chunks_exact(n)) {
+            for (mean, [x, z]) in positions[row * n..].iter_mut().zip(at) {
+                *mean = [mean[0] + weight * x, mean[1] + weight * z];
+            }
+        }
         let at = |(t, channel): (&f64, &usize)| {
             let row = times.partition_point(|time| time < t);
-            let seen = view.of(tracks[row * n + channel / 2]);
+            let seen = view.of(positions[row * n + channel / 2]);
             10.0 * seen[channel % 2]
         };
         Ok(signal.times.iter().zip(&signal.channels).map(at).collect())
+    }
+
+    /// The values of a frequency response. An analyser has one clock and one gain, so only the gain of the inputs differs from run to run.
+    fn respond(
+        &self,
+        response: &Response,
+        run: &Run,
+        terms: &[Term],
+        resolution: f64,
+        nuisance: &Nuisance,
+        step: f64,
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        let first = analytic::cantilever_frequency(&run.robot) / (run.robot.actuators as f64).powi(2);
+        let marker = &run.markers[response.channel / 2..][..1];
+        let of = |frequency: &f64| -> Result<[f64; 2], DiagnoseError> {
+            let applied = |v: f64| (1.0 + nuisance.base[Spread::GAIN]) * if v > 0.0 { run.positive_gain * v } else { v };
+            let sine = Sine::new(response, *frequency, &run.robot, first, applied);
+            let duration = sine.duration();
+            let Setup { robot, drive, chain, view } =
+                self.setup(run.robot.clone(), terms, resolution, sine.table.clone(), duration)?;
+            let tracks = track(&robot, &run.start, &drive, chain, step, marker, &sine.times(-view.delay))?;
+            let samples: Vec<f64> = tracks.into_iter().map(|at| 10.0 * view.of(at)[response.channel % 2]).collect();
+            Ok(sine.parts(&samples, self.exposure))
+        };
+        let parts: Vec<[f64; 2]> = response.frequencies.par_iter().map(of).collect::<Result<_, _>>()?;
+        Ok([0, 1].into_iter().flat_map(|part| parts.iter().map(move |parts| parts[part])).collect())
     }
 }

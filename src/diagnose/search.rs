@@ -928,6 +928,7 @@ mod tests {
                     times: (0..VALUES).map(|at| at as f64).collect(),
                     channels: vec![0; VALUES],
                     inputs: (0..VALUES).map(|at| (at as f64 * (1.0 + run as f64) / 50.0).sin()).collect(),
+                    ..Signal::default()
                 }
             };
             let candidate = |id: &'static str| Candidate {

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::dataset::Start;
+use super::track::put;
 use crate::drive::{Drive, Means, Table, Waveform};
 use crate::effects::Effect;
 use crate::engine::{Engine, EngineError, PlanarEngine};
@@ -46,31 +48,44 @@ impl Visited {
     }
 }
 
-/// What `runs` of the nominal robot visit: the drive, the time step (s) and the number of steps of each.
+/// A run of the nominal model.
+pub(super) struct Visit<'a> {
+    pub robot: &'a Robot,
+    pub start: &'a Start,
+    pub drive: Table,
+    /// Time step (s).
+    pub step: f64,
+    /// Number of steps.
+    pub steps: u64,
+}
+
+/// What `runs` visit.
 ///
 /// # Errors
 /// [`EngineError`] if a run cannot be simulated.
-pub(super) fn visited(robot: &Robot, runs: &[(Table, f64, u64)]) -> Result<Visited, EngineError> {
+pub(super) fn visited(runs: &[Visit]) -> Result<Visited, EngineError> {
     let mut volts = [0.0_f64; 2];
-    for v in runs.iter().flat_map(|(drive, ..)| drive.volts()) {
+    for v in runs.iter().flat_map(|run| run.drive.volts()) {
         volts = [volts[0].min(*v), volts[1].max(*v)];
     }
-    let largest = runs.par_iter().map(|(drive, h, steps)| extremes(robot, drive, *h, *steps)).collect::<Result<Vec<_>, _>>()?;
+    let largest = runs.par_iter().map(extremes).collect::<Result<Vec<_>, _>>()?;
     let [curvature, rate] = largest.iter().fold([LEAST; 2], |a, b| [a[0].max(100.0 * b[0]), a[1].max(100.0 * b[1])]);
     Ok(Visited { volts, curvature, rate })
 }
 
 /// Largest elastic curvature of a joint (1/cm) and largest rate of curvature (1/(cm·s)) in a run.
-fn extremes(robot: &Robot, drive: &Table, h: f64, steps: u64) -> Result<[f64; 2], EngineError> {
+fn extremes(run: &Visit) -> Result<[f64; 2], EngineError> {
+    let Visit { robot, start, drive, step: h, steps } = run;
+    let h = *h;
     let drive = Drive { waveform: Waveform::Table(drive.clone()), positive_gain: 1.0, delay: 0.0 };
     let mut engine = PlanarEngine::new(robot, h)?;
     let mut means = Means::new(&drive, robot.actuators, 0.0);
     let mut volts = vec![0.0; robot.actuators];
     drive.voltages(0.0, &mut volts);
-    engine.settle(&volts)?;
+    put(&mut engine, robot, h, start, &volts)?;
     let (link, per_volt) = (robot.link_length(), robot.joint().rest_angle_per_volt);
     let mut largest = [0.0_f64; 2];
-    for step in 0..steps {
+    for step in 0..*steps {
         means.over(step as f64 * h, (step + 1) as f64 * h, &mut volts);
         engine.prepare(&volts)?;
         engine.advance()?;

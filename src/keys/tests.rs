@@ -40,13 +40,31 @@ fn the_tables_have_the_keys_that_the_parser_accepts_and_no_others() {
     assert_eq!(listed(&sweep::TOP), accepted::<crate::sweep::File>(""));
     assert_eq!(listed(&sweep::RANGE), accepted::<crate::sweep::Range>(""));
 
-    let tables = ["dataset", "material", "robot", "markers", "noise", "bench", "run", "observation"];
+    let tables = [
+        "dataset",
+        "material",
+        "robot",
+        "markers",
+        "noise",
+        "bench",
+        "camera",
+        "columns",
+        "effect",
+        "run",
+        "frequency_response",
+        "steady",
+        "observation",
+    ];
     assert_eq!(accepted::<Description>(""), tables.map(String::from).into());
     let sections: BTreeSet<_> = super::FILES[2].sections.iter().map(|section| section.name).collect();
-    assert_eq!(sections, tables.into_iter().chain(["robot.friction"]).collect());
+    assert_eq!(sections, tables.into_iter().chain(["robot.friction", "run.release"]).collect());
     assert_eq!(listed(&dataset::DATASET), accepted::<crate::diagnose::dataset::About>(""));
     assert_eq!(listed(&dataset::BENCH), accepted::<crate::diagnose::dataset::Bench>(""));
     assert_eq!(listed(&dataset::RUN), accepted::<crate::diagnose::dataset::RunEntry>(""));
+    assert_eq!(listed(&dataset::RELEASE), accepted::<crate::diagnose::dataset::Release>(""));
+    assert_eq!(listed(&dataset::COLUMNS), accepted::<crate::diagnose::dataset::Column>(""));
+    assert_eq!(listed(&dataset::CAMERA), accepted::<crate::diagnose::dataset::Camera>(""));
+    assert_eq!(listed(&dataset::FREQUENCY_RESPONSE), accepted::<crate::diagnose::dataset::ResponseEntry>(""));
     assert_eq!(listed(&dataset::OBSERVATION), accepted::<crate::diagnose::dataset::Observation>(""));
 }
 
@@ -325,6 +343,14 @@ fn the_keys_of_sweeps_and_datasets_that_are_needed_are_missed() {
     });
     let observation = "measure = \"speed_mm_s\"\nvalue = 1\nsigma = 1\ndrive = {}";
     refuses(&[&dataset::OBSERVATION], observation, &|text| toml::from_str::<crate::diagnose::dataset::Observation>(text).is_ok());
+    let response = "id = \"a\"\nfile = \"b\"\ncoordinate = \"tip_z\"\namplitude_v = 1\nsigma_mm = 1";
+    refuses(&[&dataset::FREQUENCY_RESPONSE], response, &|text| {
+        toml::from_str::<crate::diagnose::dataset::ResponseEntry>(text).is_ok()
+    });
+    refuses(&[&dataset::STEADY], "voltages_v = [1]\ntip_z_mm = 1", &|text| {
+        toml::from_str::<crate::diagnose::dataset::Steady>(text).is_ok()
+    });
+    refuses(&[&dataset::COLUMNS], "from = \"t\"", &|text| toml::from_str::<crate::diagnose::dataset::Column>(text).is_ok());
     refuses(&[&dataset::DATASET], "name = \"a\"", &|text| toml::from_str::<crate::diagnose::dataset::About>(text).is_ok());
 }
 

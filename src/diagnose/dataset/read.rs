@@ -1,14 +1,16 @@
 //! Reading a data set, with checks of description and runs.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use super::super::observations;
 use super::super::observations::ObservationError;
-use super::super::{observations, robot, run_csv, voltage};
-use super::{DataError, Dataset, Description, MOST_STEPS, Marker, MeasuredRun};
-use crate::analytic;
-use crate::experiment::{self, Config, ConfigError, DriveConfig, SimulationConfig, Source, StepConfig, presets};
-use crate::model::{Mount, Robot};
+use super::super::run_csv;
+use super::{Camera, Column, DataError, Dataset, Description, Marker, MeasuredRun};
+use crate::effects::{self, Kind};
+use crate::experiment::{self, Config, ConfigError, DriveConfig, EffectConfig, SimulationConfig, Source, StepConfig, presets};
+use crate::model::Robot;
 use crate::words;
 
 /// Range of a standard deviation (mm).
@@ -34,7 +36,9 @@ impl Dataset {
         })?;
         let wrong =
             |key: &[&str], reason: String| DataError::Content { path: path.into(), line: line_of(&text, key), column: 0, reason };
-        if let (false, [_, ..]) = (description.run.is_empty(), &description.observation[..]) {
+        let has_runs =
+            !(description.run.is_empty() && description.frequency_response.is_empty() && description.steady.is_empty());
+        if let (true, [_, ..]) = (has_runs, &description.observation[..]) {
             return Err(value_error(
                 path,
                 &text,
@@ -54,27 +58,22 @@ impl Dataset {
                 duration_s: Some(1.0),
                 ..SimulationConfig::default()
             },
-            effect: Vec::new(),
+            effect: description.effect,
         };
-        let robot = resolved_robot(path, &text, &nominal)?;
+        check_effects(&nominal.effect)
+            .map_err(|(index, reason)| value_error(path, &text, &["effect", &index.to_string()], "effect", reason))?;
+        let robot = resolved_robot(path, &text, &nominal, &[])?;
         let length = robot.material.actuator_length * robot.actuators as f64;
-        if description.run.is_empty() && description.observation.is_empty() {
+        if !has_runs && description.observation.is_empty() {
             return Err(wrong(&["dataset"], "there are no runs: add [[run]] tables with id and file".into()));
         }
-        if description.markers.is_empty() && !description.run.is_empty() {
+        if description.markers.is_empty() && has_runs {
             return Err(wrong(&["markers"], "there are no markers: add [markers] with name = distance in mm".into()));
         }
         let mut markers = Vec::new();
         for (name, position) in &description.markers {
             if !(0.0..=10.0 * length + 1e-9).contains(position) {
-                return Err(wrong(
-                    &["markers", name],
-                    format!(
-                        "marker {name} is at {} mm, but the robot is {} mm long",
-                        words::number(*position),
-                        words::number(10.0 * length)
-                    ),
-                ));
+                return Err(wrong(&["markers", name], beyond(name, *position, length)));
             }
             markers.push(Marker { name: name.clone(), position: 0.1 * position });
         }
@@ -110,21 +109,40 @@ impl Dataset {
             let own = description.noise.get(&format!("{}_mm", marker.name)).or(description.noise.get("default_mm")).copied();
             noise.extend([own, own]);
         }
+        let columns = &description.columns;
+        run_csv::check_columns(columns, &robot, &markers)
+            .map_err(|(key, reason)| value_error(path, &text, &["columns", &key], &format!("columns.{key}"), reason))?;
+        let camera = description.camera;
+        let per_frame = camera.frame_rate_hz.map_or(1e3, |rate| 1e3 / rate);
+        for (key, value, most) in [("frame_rate_hz", camera.frame_rate_hz, 1e6), ("exposure_ms", camera.exposure_ms, per_frame)] {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && *value <= most * (1.0 + 1e-9))) {
+                let reason = format!("is {}, but must be above 0 and at most {}", words::number(value), words::number(most));
+                let why =
+                    if key == "exposure_ms" && camera.frame_rate_hz.is_some() { ", the time between two frames" } else { "" };
+                return Err(value_error(path, &text, &["camera", key], &format!("camera.{key}"), reason + why));
+            }
+        }
+        let reader = Reader { path, text: &text, nominal: &nominal, robot: &robot, markers: &markers, columns, camera };
         let mut runs: Vec<MeasuredRun> = Vec::new();
         for (index, entry) in description.run.iter().enumerate() {
             let number = index.to_string();
-            let at = |key: &'static str| ["run", &number, key];
             if entry.id.trim().is_empty() {
-                return Err(wrong(&at("id"), "id is empty; every run needs a name".into()));
+                return Err(wrong(&["run", &number, "id"], "id is empty; every run needs a name".into()));
             }
             if runs.iter().any(|run| run.id == entry.id) {
-                return Err(wrong(&at("id"), format!("id: two runs are called {:?}", entry.id)));
+                return Err(wrong(&["run", &number, "id"], format!("id: two runs are called {:?}", entry.id)));
             }
-            let file = path.parent().unwrap_or(Path::new("")).join(&entry.file);
-            let run_csv::Rows { times, voltages, channels, remarks } =
-                run_csv::read(&file, &robot, nominal.robot.positive_gain.unwrap_or(1.0), &markers)?;
-            let run = MeasuredRun { id: entry.id.clone(), path: file, role: entry.role, times, voltages, channels, remarks };
-            runs.push(run.checked(&robot)?);
+            runs.push(reader.run(index, entry)?);
+        }
+        for (index, entry) in description.frequency_response.iter().enumerate() {
+            if runs.iter().any(|run| run.id == entry.id) {
+                let parts = ["frequency_response", &index.to_string(), "id"];
+                return Err(wrong(&parts, format!("id: two runs are called {:?}", entry.id)));
+            }
+            runs.push(reader.response(index, entry)?);
+        }
+        for (index, entry) in description.steady.iter().enumerate() {
+            runs.push(reader.steady(index, entry)?);
         }
         let mut observations = description.observation;
         for (index, observation) in observations.iter_mut().enumerate() {
@@ -153,53 +171,62 @@ impl Dataset {
             markers,
             noise,
             bench: description.bench,
+            camera,
             runs,
             observations,
         })
     }
 }
 
-impl MeasuredRun {
-    /// The run, if it is short enough to be simulated and its voltages are known between rows.
-    fn checked(mut self, robot: &Robot) -> Result<Self, DataError> {
-        let bad =
-            |reason: String| DataError::Unreadable { path: self.path.clone(), reason: format!("run {}: {reason}", self.id) };
-        let duration = self.times[self.times.len() - 1] - self.times[0];
-        let steps = duration / robot::step(robot, &self.times);
-        if steps > MOST_STEPS {
-            return Err(bad(format!(
-                "{duration} s in steps that suit the robot and the rows are {steps:.1e} steps, more than {MOST_STEPS:.0e}; is t_s in seconds?"
-            )));
+/// A description being read.
+pub(super) struct Reader<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
+    pub nominal: &'a Config,
+    pub robot: &'a Robot,
+    pub markers: &'a [Marker],
+    pub columns: &'a BTreeMap<String, Column>,
+    pub camera: Camera,
+}
+
+/// What is wrong with a marker at `position` (mm) of a robot of `length` (cm).
+pub(super) fn beyond(name: &str, position: f64, length: f64) -> String {
+    let [position, length] = [position, 10.0 * length].map(words::number);
+    format!("marker {name} is at {position} mm, but the robot is {length} mm long")
+}
+
+/// Checks that known effects are of the structure, which all runs have from start to end.
+///
+/// # Errors
+/// The index of the wrong one, and why.
+pub(super) fn check_effects(effects: &[EffectConfig]) -> Result<(), (usize, String)> {
+    for (index, effect) in effects.iter().enumerate() {
+        if effects::find(&effect.id).is_some_and(|known| known.kind != Kind::Structure) {
+            let known: Vec<&str> = effects::EFFECTS.iter().filter(|e| e.kind == Kind::Structure).map(|e| e.id).collect();
+            let reason = format!(
+                "is {}, but what a data set knows to be there must be of the structure: {}; other causes are for the diagnosis to find",
+                effect.id,
+                known.join(", ")
+            );
+            return Err((index, reason));
         }
-        if let Some(reason) = voltage::too_coarse(&self.times, &self.voltages, robot.actuators) {
-            return Err(bad(reason));
-        }
-        let rate = (self.times.len() - 1) as f64 / duration;
-        let first = analytic::cantilever_frequency(robot) / (robot.actuators as f64).powi(2);
-        if robot.mount == Mount::Clamped && rate < 2.0 * first {
-            self.remarks.push(format!(
-                "{rate:.1} rows per second show a drive of more than {:.1} Hz as a slower one, and the robot's first mode is at {first:.1} Hz; if it was \
-                 driven that fast, record the voltage ten times per period",
-                0.5 * rate
-            ));
-        }
-        Ok(self)
     }
+    Ok(())
 }
 
 /// Line (from 1) of the deepest part of a key that the text contains; 1 without any.
-fn line_of(text: &str, key: &[&str]) -> u64 {
+pub(super) fn line_of(text: &str, key: &[&str]) -> u64 {
     experiment::line_of(text, key.iter().copied()).map_or(1, |line| line as u64)
 }
 
 /// A wrong value of a description: a usage error.
-fn value_error(path: &Path, text: &str, parts: &[&str], key: &str, message: impl Into<String>) -> DataError {
+pub(super) fn value_error(path: &Path, text: &str, parts: &[&str], key: &str, message: impl Into<String>) -> DataError {
     let place = format!("{}, line {}", path.display(), line_of(text, parts));
     ConfigError::Value { place, key: key.into(), message: message.into() }.into()
 }
 
-/// The robot of a description, resolved as that of an experiment at rest.
-fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, ConfigError> {
+/// The robot of a config, resolved as that of an experiment at rest; `table` is the path of the table in the description that overrides it.
+pub(super) fn resolved_robot(path: &Path, text: &str, nominal: &Config, table: &[&str]) -> Result<Robot, ConfigError> {
     let actuators = nominal.robot.actuators.unwrap_or(5);
     let mut config = nominal.clone();
     config.drive.waveform = Some("dc".into());
@@ -211,7 +238,7 @@ fn resolved_robot(path: &Path, text: &str, nominal: &Config) -> Result<Robot, Co
             match error {
                 // Lines of the description, not of the experiment made from it.
                 ConfigError::Value { key, message, .. } => {
-                    let parts: Vec<&str> = key.split('.').collect();
+                    let parts: Vec<&str> = table.iter().copied().chain(key.split('.')).collect();
                     ConfigError::Value { place: format!("{}, line {}", path.display(), line_of(text, &parts)), key, message }
                 }
                 other => other,

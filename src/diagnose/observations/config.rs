@@ -1,7 +1,7 @@
 //! The experiment of an observation.
 
 use super::super::DiagnoseError;
-use super::super::dataset::{MOST_STEPS, Observation};
+use super::super::dataset::{MOST_STEPS, Observation, overridden};
 use crate::experiment::{Config, ConfigError, Source, StepConfig, experiment};
 use crate::model::Mount;
 use crate::recording::definitions;
@@ -14,27 +14,9 @@ const RECORD: f64 = 1e-3;
 
 /// The experiment of an observation. A resonance under a sine without frequency is measured on the ringing after a step.
 pub(super) fn config(nominal: &Config, observation: &Observation) -> Result<Config, DiagnoseError> {
-    let merged = |own: toml::Value, over: toml::Value| match (own, over) {
-        (toml::Value::Table(mut own), toml::Value::Table(over)) => {
-            own.extend(over);
-            toml::Value::Table(own)
-        }
-        (_, over) => over,
-    };
-    let wrong = |error: &dyn std::fmt::Display| DiagnoseError::Observation {
-        measure: observation.measure.clone(),
-        reason: error.to_string(),
-    };
-    let value = |v: Result<toml::Value, toml::ser::Error>| v.map_err(|error| wrong(&error));
-    let robot = merged(value(toml::Value::try_from(&nominal.robot))?, value(toml::Value::try_from(&observation.robot))?);
-    let material = merged(value(toml::Value::try_from(&nominal.material))?, value(toml::Value::try_from(&observation.material))?);
-    let mut config = Config {
-        robot: robot.try_into().map_err(|error: toml::de::Error| wrong(&error))?,
-        material: material.try_into().map_err(|error: toml::de::Error| wrong(&error))?,
-        drive: observation.drive.clone(),
-        simulation: observation.simulation.clone(),
-        effect: Vec::new(),
-    };
+    let config = overridden(nominal, &observation.robot, &observation.material)
+        .map_err(|reason| DiagnoseError::Observation { measure: observation.measure.clone(), reason })?;
+    let mut config = Config { drive: observation.drive.clone(), simulation: observation.simulation.clone(), ..config };
     let drive = &mut config.drive;
     if observation.measure == "resonance_hz" && drive.waveform.as_deref() == Some("sine") && drive.frequency_hz.is_none() {
         let actuators = config.robot.actuators.unwrap_or(5);

@@ -122,6 +122,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         times: vec![0.0],
         channels: vec![0],
         inputs: vec![0.0],
+        ..Signal::default()
     });
     let plant = Numbers {
         dataset,

@@ -2,8 +2,8 @@
 //!
 //! Newton steps minimise the energy Σ k (θ − θ_V)²/2 + Σ m g z with the corners above the floor. They leave out how the lever arms of gravity and floor
 //! change, so a step is the same O(n) problem as a step in time, with displacements for velocities, k for the implicit terms and a frictionless floor. What is
-//! left out is small beside k, so the steps converge linearly. Without friction the equilibrium on the floor does not depend on how it is reached; the
-//! centre of mass keeps its x.
+//! left out is mostly small beside k, so the steps converge linearly; where it is not they overshoot and are shortened. Without friction the equilibrium on
+//! the floor does not depend on how it is reached; the centre of mass keeps its x.
 
 use fearless_simd::{Simd, dispatch, prelude::*};
 use wide::f64x2;
@@ -24,6 +24,8 @@ const LARGEST_TURN: f64 = 0.2;
 /// A step that turns no body by more than this (rad) is the last.
 const SETTLED: f64 = 1e-13;
 const LARGEST_STEPS: u32 = 2000;
+/// After this many steps without progress the next ones are half as long: where weights bend the robot more than its stiffness bears, whole ones overshoot.
+const STEPS_TO_PROGRESS: u32 = 100;
 
 impl PlanarEngine {
     /// Puts the robot at rest into its equilibrium under constant `voltages` (V, one per actuator), gravity and the floor.
@@ -67,7 +69,8 @@ impl PlanarEngine {
         let weight = (self.mass * self.gravity).max(f64::MIN_POSITIVE);
         let law = ContactLaw::statics(weight / GIVE);
         let zero = Four::splat(simd, 0.0);
-        for _ in 0..LARGEST_STEPS {
+        let (mut relaxation, mut least_turn) = (1.0, f64::INFINITY);
+        for step in 1..=LARGEST_STEPS {
             let mut before = Two::splat(simd, 0.0);
             for (k, (quad, body)) in self.quads.iter_mut().zip(bodies).enumerate() {
                 quad.posed = quad.angle;
@@ -89,7 +92,11 @@ impl PlanarEngine {
             if !largest.is_finite() {
                 return Ok(false);
             }
-            let share = (LARGEST_TURN / largest).min(1.0);
+            if step % STEPS_TO_PROGRESS == 0 {
+                relaxation *= if largest < least_turn { 1.0 } else { 0.5 };
+                least_turn = largest;
+            }
+            let share = relaxation * (LARGEST_TURN / largest).min(1.0);
             let mut rise = zero;
             for quad in &mut self.quads {
                 let [turn, _, z] = quad.mean_of_centre(simd);
