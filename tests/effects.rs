@@ -355,7 +355,7 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         ("below_4_v", d),
         ("below_5_v", e),
     ];
-    let cases: [(Effects, Effects); 9] = [
+    let cases: [(Effects, Effects); 10] = [
         (
             &[(
                 "free-joint-memory",
@@ -371,6 +371,13 @@ fn free_forms_hold_the_named_laws_of_their_places() {
             &[("creep", &[("per_decade", 0.25), ("rungs_per_decade", 0.0), ("fastest_s", 0.1)])],
         ),
         (&[("free-voltage-curve", &line)], &[("actuation-gain", &[("scale", 1.1)])]),
+        (
+            &[(
+                "free-gain-along",
+                &[("change_1", 0.1), ("change_2", 0.1), ("change_3", 0.1), ("change_4", 0.1), ("change_5", 0.1)],
+            )],
+            &[("actuation-gain", &[("scale", 1.1)])],
+        ),
         (&[("free-drag", &[("cubic", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 3.0)])]),
         (&[("free-drag", &[("linear", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.0)])]),
         (&[("free-joint-memory", &loss)], &[("structural-damping", &[("loss_factor", 0.05 * 0.68), ("exponent", -0.5)])]),

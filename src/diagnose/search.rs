@@ -20,6 +20,9 @@ pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
 /// right; ...
 const LEAST_SHARE: f64 = 0.004;
+/// Nothing more is sought once no more than this share of it is left: further causes would be minor, and would parcel out what the laws of the
+/// others do not follow.
+const SOUGHT: f64 = 0.02;
 /// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
@@ -331,8 +334,7 @@ impl Search<'_> {
     pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, DiagnoseError> {
         let scored = self.fitted(&Model::new(self.constants(), resolution, false))?;
         let scored = self.settle(scored)?;
-        let (chi2, runs) =
-            if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) };
+        let (chi2, runs) = self.chi2_to_judge_by(&scored);
         self.unexplained = (chi2 / self.estimator.count(runs).max(1) as f64 - 1.0).max(0.0);
         Ok(scored)
     }
@@ -545,7 +547,9 @@ impl Search<'_> {
     pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
-        for _ in 0..MOST_CAUSES {
+        let mut causes = 0;
+        while causes < MOST_CAUSES && self.share_left(&best) > SOUGHT {
+            causes += 1;
             let (trials, screened) = self.trials(&best)?;
             // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
             let top_of =
@@ -565,6 +569,9 @@ impl Search<'_> {
                     None => self.both(&screened, &best),
                 },
             };
+            if let Some(worthy) = &worthy {
+                (self.progress)(&self.adopting(worthy, &best));
+            }
             let Some(worthy) = worthy else {
                 first.get_or_insert(trials);
                 break;
@@ -618,6 +625,26 @@ impl Search<'_> {
         let Some(best) = best else { return Ok(scored) };
         let best = self.fitted(best.model())?;
         Ok(if self.is_significant(&best, &scored) { best } else { scored })
+    }
+
+    /// What a model leaves, as a share of what re-tuned constants leave.
+    fn share_left(&self, scored: &Scored) -> f64 {
+        let (chi2, runs) = self.chi2_to_judge_by(scored);
+        let left = chi2 / self.estimator.count(runs).max(1) as f64 - 1.0;
+        if self.unexplained > 0.0 { left / self.unexplained } else { 1.0 }
+    }
+
+    /// χ² of the held-out runs, or of the fit runs where there are none.
+    fn chi2_to_judge_by(&self, scored: &Scored) -> (f64, &[usize]) {
+        if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) }
+    }
+
+    /// The adoption of a model's last term, in words.
+    fn adopting(&self, worthy: &Scored, best: &Scored) -> String {
+        let (after, runs) = self.chi2_to_judge_by(worthy);
+        let count = self.estimator.count(runs).max(1) as f64;
+        let name = worthy.model().terms.last().map_or("nothing", |term| self.id(term.candidate));
+        format!("adopting {name}: χ² per value from {:.2} to {:.2}", self.chi2_to_judge_by(best).0 / count, after / count)
     }
 
     /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.

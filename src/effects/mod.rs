@@ -164,6 +164,7 @@ pub static EFFECTS: &[&Effect] = &[
     &actuation::FREE_VOLTAGE_PLAYS,
     &actuation::FREE_VOLTAGE_MEMORY,
     &actuation::FIELD_DEPENDENT_GAIN,
+    &actuation::FREE_GAIN_ALONG,
     &actuation::FREE_VOLTAGE_CURVE,
     &actuation::POLARITY_ASYMMETRY,
     &actuation::WEAK_ACTUATOR,

@@ -2,6 +2,7 @@
 
 mod creep;
 mod field_dependent_gain;
+mod free_gain_along;
 mod free_voltage_curve;
 mod free_voltage_memory;
 mod free_voltage_plays;
@@ -12,6 +13,7 @@ mod weak_actuator;
 
 pub use creep::CREEP;
 pub use field_dependent_gain::FIELD_DEPENDENT_GAIN;
+pub use free_gain_along::FREE_GAIN_ALONG;
 pub use free_voltage_curve::FREE_VOLTAGE_CURVE;
 pub use free_voltage_memory::FREE_VOLTAGE_MEMORY;
 pub use free_voltage_plays::FREE_VOLTAGE_PLAYS;
