@@ -270,8 +270,8 @@ fn a_robot_settles_where_its_stiffness_bears_its_weight() {
         let robot = &experiment.robot;
         let mut engine = engine(&experiment, 1e-4);
         engine.settle(&[0.0]).unwrap_or_else(|error| panic!("{times}: {error}"));
-        let mut nodes = vec![0.0; 3 * 8];
-        engine.nodes(&mut nodes, &mut vec![0.0; 3 * 8]).unwrap();
+        let mut nodes = [0.0; 3 * 8];
+        engine.nodes(&mut nodes, &mut [0.0; 3 * 8]).unwrap();
         engine.prepare(&[0.0]).unwrap();
         for (joint, angle) in engine.joints().angles.iter().enumerate() {
             let distal = robot.segments().into_iter().enumerate().skip(joint + 1);

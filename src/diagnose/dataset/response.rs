@@ -76,7 +76,7 @@ impl Reader<'_> {
         if entry.id.trim().is_empty() {
             return Err(wrong("id", "is empty; every run needs a name".into()));
         }
-        if !(amplitude_v > 0.0) {
+        if amplitude_v.is_nan() || amplitude_v <= 0.0 {
             return Err(wrong(
                 "amplitude_v",
                 format!("is {}, but must be positive: the phase is that to the voltage", number(amplitude_v)),
@@ -129,7 +129,7 @@ impl Reader<'_> {
                 let names: Vec<&str> = coordinates.iter().map(String::as_str).chain(["voltages_v", "sigma_mm", "role"]).collect();
                 return Err(wrong(key, format!("is no key of [[steady]]: {}", names.join(", "))));
             };
-            if !(value.abs() <= MOST_MM) {
+            if value.is_nan() || value.abs() > MOST_MM {
                 return Err(wrong(key, format!("is {}, but must be within {MOST_MM:.0} mm", number(*value))));
             }
             run.channels[channel] = vec![*value];

@@ -242,7 +242,7 @@ impl Reader<'_> {
                 }
                 let (position, z) = (positions[at], 0.1 * z);
                 // Beyond, the sheet hangs almost straight down, or would have to be stretched.
-                if !(z.abs() < 0.9 * position) {
+                if z.is_nan() || z.abs() >= 0.9 * position {
                     let reason = format!("is {}, but must be within {} mm", number(10.0 * z), number(9.0 * position));
                     return wrong(&["release", "held_z_mm"], reason);
                 }
