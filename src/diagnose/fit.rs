@@ -495,6 +495,11 @@ impl<'a> Estimator<'a> {
         (0..self.plant.signals().len()).into_par_iter().map(of).collect()
     }
 
+    /// The spread of the bench's faults with a given prior alone.
+    pub fn given_spread(&self) -> Spread {
+        Spread { of: self.plant.bench().map(|sd| sd.unwrap_or(0.0)) }
+    }
+
     /// The spread of the bench's faults that suits `model` on `runs` best.
     ///
     /// # Errors

@@ -35,11 +35,25 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
             Some(count) => format!("{count} time constants in a decade"),
             None => String::new(),
         },
-        "saturation" => match fitted.next() {
-            Some("min_v") => "of negative voltages".into(),
-            Some("max_v") => "of positive voltages".into(),
+        "saturation" => match (fitted.next(), fitted.next()) {
+            (Some("min_v"), None) => "of negative voltages".into(),
+            (Some("max_v"), None) => "of positive voltages".into(),
+            (Some("min_v"), _) => "soft, of negative voltages".into(),
+            (Some("max_v"), _) => "soft, of positive voltages".into(),
             _ => String::new(),
         },
+        "field-dependent-gain" => fitted.find(|name| *name == "exponent").map_or("", |_| "as a power").into(),
+        "driver-lag" => fitted.find(|name| *name == "inertia").map_or("", |_| "of second order").into(),
+        "slew-limit" => match fitted.nth(1) {
+            Some("rising") => "with another rate of rising voltages".into(),
+            Some(_) => "approached softly".into(),
+            None => String::new(),
+        },
+        "air-drag" | "stiffness-softening" | "structural-damping" | "polarity-asymmetry" => {
+            fitted.nth(1).map_or("", |_| "with an exponent").into()
+        }
+        "dry-friction" => fitted.nth(1).map_or("", |_| "with presliding").into(),
+        "clamp-compliance" => fitted.nth(1).map_or("", |_| "with a damper").into(),
         "weak-actuator" => given("actuator").map_or_else(String::new, |number| format!("number {number}")),
         _ => String::new(),
     }
@@ -60,9 +74,10 @@ pub fn parameter(id: &str, name: &str) -> String {
     match (id, name) {
         (_, "scale") => cause(id),
         ("discretisation", "motors_per_actuator") => "joints per actuator".into(),
-        ("clamp-compliance", _) => "turn of the clamp per moment".into(),
+        ("clamp-compliance", "compliance_rad_per_n_m") => "turn of the clamp per moment".into(),
         ("initial-curvature", "curvature_per_m") => "curvature without voltage".into(),
-        ("stiffness-softening", _) => "softening coefficient".into(),
+        ("stiffness-softening", "softening_mm2") => "softening coefficient".into(),
+        ("dry-friction", "presliding_per_m") => "curvature from which it slides".into(),
         ("dry-friction", _) => "moment of friction in every joint".into(),
         ("tip-mass", "position_mm") => "distance from the left end".into(),
         ("hysteresis", "width") => "opening of the loop, share of a 1500 V stroke".into(),
@@ -78,7 +93,11 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("field-dependent-gain", "curvature_per_kv2") => "curvature of the gain".into(),
         ("saturation", "min_v") => "least voltage".into(),
         ("saturation", "max_v") => "largest voltage".into(),
+        ("slew-limit", "rising") => "largest rate of rising voltages over that of falling ones".into(),
+        ("slew-limit", "linear_s") => "time constant of small changes".into(),
         ("slew-limit", _) => "largest rate".into(),
+        ("driver-lag", "inertia") => "inertia of the driver".into(),
+        ("field-dependent-gain", "reference_v") => "voltage of nominal gain".into(),
         ("ground-friction", _) => "factor on the friction".into(),
         ("sensor-scale", _) => "scale of the camera".into(),
         _ => {

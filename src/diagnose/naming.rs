@@ -50,9 +50,9 @@ pub fn name(search: &mut Search, open: Scored) -> Result<Naming, DiagnoseError> 
 struct Place<'a> {
     search: &'a Search<'a>,
     /// The model with the free form.
-    best: &'a Scored,
+    best: Scored,
     /// The free form.
-    free: &'a Term,
+    free: Term,
     /// The model without the free form and without named causes of its place, which give way to a single name.
     bare: Scored,
 }
@@ -65,13 +65,15 @@ struct Attempt {
 }
 
 impl<'a> Place<'a> {
-    fn new(search: &'a Search<'a>, best: &'a Scored, index: usize) -> Result<Self, DiagnoseError> {
-        let free = &best.model().terms[index];
-        let mut model = best.model().clone();
-        let is_of_place = |term: &Term| is_of(search, free, term) && !search.candidate(term).is_constant;
-        model.terms.retain(|term| term != free && !is_of_place(term));
+    /// Without faults of the bench but given ones: a camera's scale that differs from run to run is linear about the model with the free form, and
+    /// could stand in for what a name lacks.
+    fn new(search: &'a Search<'a>, best: &Scored, index: usize) -> Result<Self, DiagnoseError> {
+        let free = best.model().terms[index].clone();
+        let mut model = Model { spread: search.estimator.given_spread(), ..best.model().clone() };
+        let best = search.fitted_at_its_spread(&model)?;
+        let is_of_place = |term: &Term| is_of(search, &free, term) && !search.candidate(term).is_constant;
+        model.terms.retain(|term| term.candidate != free.candidate && !is_of_place(term));
         (search.progress)("the place without its free form");
-        // On the same bench: faults could stand in for what is missing.
         Ok(Self { bare: search.fitted_at_its_spread(&model)?, search, best, free })
     }
 
@@ -90,7 +92,7 @@ impl<'a> Place<'a> {
         let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
         let found = match least(standing) {
             Some(found) => Some(found),
-            None => least(self.pairs(&others)?).filter(|pair| cost(pair) < self.search.cost(self.best)),
+            None => least(self.pairs(&others)?).filter(|pair| cost(pair) < self.search.cost(&self.best)),
         };
         let found = found.map(|found| found.scored);
         Ok((if found.is_some() { found } else { self.alone()? }, nearest))
@@ -112,10 +114,13 @@ impl<'a> Place<'a> {
             tried.extend(with.map(|with| Attempt { name: most.map_or(with.name, |most| most.name), ..with }));
         }
         let mut without = self.best.model().clone();
-        without.terms.retain(|term| term != self.free);
+        without.terms.retain(|term| term.candidate != self.free.candidate);
         if without.terms.len() > self.bare.model().terms.len() {
-            let name =
-                without.terms.iter().rfind(|term| is_of(self.search, self.free, term)).map(|term| self.search.candidate(term).id);
+            let name = without
+                .terms
+                .iter()
+                .rfind(|term| is_of(self.search, &self.free, term))
+                .map(|term| self.search.candidate(term).id);
             tried.extend(self.attempt(&without).map(|kept| Attempt { name: name.unwrap_or(kept.name), ..kept }));
         }
         Ok(tried)
@@ -152,20 +157,20 @@ impl<'a> Place<'a> {
     /// Share of what the free form takes on held-out runs that another model takes.
     fn taken(&self, scored: &Scored) -> f64 {
         let below = |scored: &Scored| self.search.judged(&self.bare) - self.search.judged(scored);
-        below(scored) / below(self.best).max(f64::MIN_POSITIVE)
+        below(scored) / below(&self.best).max(f64::MIN_POSITIVE)
     }
 
     /// A model whose last term is the name; none if it cannot be fitted.
     fn attempt(&self, model: &Model) -> Option<Attempt> {
         let name = self.search.candidate(model.terms.last()?).id;
-        (self.search.progress)(&format!("{name} in the stead of {}", self.search.candidate(self.free).id));
+        (self.search.progress)(&format!("{name} in the stead of {}", self.search.candidate(&self.free).id));
         let scored = self.search.fitted_at_its_spread(model).ok()?;
         Some(Attempt { name, taken: self.taken(&scored), scored })
     }
 
     /// True if a model's last term is a named cause of the place.
     fn is_rival(&self, model: &Model) -> bool {
-        model.terms.last().is_some_and(|term| !self.search.candidate(term).is_free_form && is_of(self.search, self.free, term))
+        model.terms.last().is_some_and(|term| !self.search.candidate(term).is_free_form && is_of(self.search, &self.free, term))
     }
 }
 

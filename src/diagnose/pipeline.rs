@@ -1,7 +1,6 @@
 //! The diagnosis of a plant, from its measured runs to a [`Diagnosis`].
 
 use super::DiagnoseError;
-use super::bench::Spread;
 use super::curve::curve;
 use super::dataset::Role;
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Nearest, Part, Ranked, RunError, Stage, Verdict};
@@ -12,7 +11,7 @@ use super::names;
 use super::naming::{self, Naming};
 use super::plant::{Model, Plant, Signal, Term};
 use super::residual_tests::residual_tests;
-use super::search::{Scored, Search, Split, Trial, split};
+use super::search::{SOUGHT, Scored, Search, Split, Trial, split};
 use super::stability::{Standing, standing};
 use super::summary::{Findings, failing, summary};
 
@@ -96,7 +95,7 @@ pub fn diagnose(
         calibrated = search.calibrated(start)?;
     }
     let insufficient = insufficient_data(plant, &search.split);
-    let Causes { best, trials, replaced, coarse_total, spikes: more, open, nearest } =
+    let Causes { best, trials, replaced, coarse_total, spikes: more, open, nearest, .. } =
         find(&mut search, &calibrated, insufficient.is_some())?;
     if spikes + more > 0 {
         remarks.push(format!("{} single values far off their neighbours' residuals were left out", spikes + more));
@@ -356,6 +355,8 @@ struct Causes {
     coarse_total: f64,
     /// Number of single values that were masked.
     spikes: usize,
+    /// Share of what re-tuned constants leave that the causes leave before faults of the bench.
+    share_left: f64,
     /// χ² per value above 1 of the model with free forms; infinite without any.
     open: f64,
     /// The places of every free form, and the names that were tried in its stead.
@@ -369,7 +370,7 @@ struct Causes {
 /// the way, and the less costly model counts.
 fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
-    let without = Spread { of: search.estimator.plant.bench().map(|sd| sd.unwrap_or(0.0)) };
+    let without = search.estimator.given_spread();
     let has_faults = calibrated.model().spread != without;
     search.estimator.held_spread = has_faults.then_some(without);
     let start = if has_faults {
@@ -379,20 +380,25 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
     };
     // Two causes that cost more than the bench's faults alone are not what is missing.
     search.limit = if has_faults { search.cost(calibrated) } else { f64::INFINITY };
+    search.set_unexplained(&start);
     let mut causes = select(search, &start, is_insufficient)?;
     search.limit = f64::INFINITY;
-    if has_faults && (causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated)) {
+    // Causes that leave next to nothing without any fault are no faults.
+    let may_be_faults = has_faults && causes.share_left > SOUGHT;
+    if may_be_faults && (causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated)) {
         (search.progress)("causes with faults of the bench in the way");
         let plain = search.cost(&causes.best);
         let after = (search.estimator.state(), search.split.clone());
         search.estimator.restore(before.0);
         search.split = before.1;
+        search.set_unexplained(calibrated);
         let other = select(search, calibrated, is_insufficient)?;
         if search.cost(&other.best) <= plain + LEAST_COST {
             causes = other;
         } else {
             search.estimator.restore(after.0);
             search.split = after.1;
+            search.set_unexplained(&start);
         }
     }
     name_causes(search, &mut causes)?;
@@ -442,6 +448,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
             trials,
             replaced: Vec::new(),
             spikes: 0,
+            share_left: 1.0,
             open: f64::INFINITY,
             nearest: Vec::new(),
         });
@@ -453,6 +460,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     best = search.resolve(best)?;
     best = search.backward(best)?;
     best = search.resolve(best)?;
+    let share_left = search.share_left(&best);
     if search.estimator.held_spread.take().is_some() {
         best = search.settle(best)?;
         best = search.backward(best)?;
@@ -481,7 +489,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.settle(best)?;
     }
     let coarse_total = best.total();
-    Ok(Causes { best, trials, replaced, coarse_total, spikes, open: f64::INFINITY, nearest: Vec::new() })
+    Ok(Causes { best, trials, replaced, coarse_total, spikes, share_left, open: f64::INFINITY, nearest: Vec::new() })
 }
 
 /// Why the data are insufficient to tell causes apart, if so.

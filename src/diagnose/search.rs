@@ -22,7 +22,7 @@ pub(super) const LEAST_GAIN: f64 = 0.03;
 const LEAST_SHARE: f64 = 0.004;
 /// Nothing more is sought once no more than this share of it is left: further causes would be minor, and would parcel out what the laws of the
 /// others do not follow.
-const SOUGHT: f64 = 0.02;
+pub(super) const SOUGHT: f64 = 0.02;
 /// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
@@ -119,7 +119,7 @@ pub struct Search<'a> {
     pub estimator: Estimator<'a>,
     /// The runs.
     pub split: Split,
-    /// χ² per value above 1 of re-tuned constants on the held-out runs, set by [`calibrated`](Self::calibrated).
+    /// χ² per value above 1 of re-tuned constants on the held-out runs.
     pub unexplained: f64,
     /// Models with two causes that cost more are given up; infinite for none.
     pub limit: f64,
@@ -334,8 +334,7 @@ impl Search<'_> {
     pub fn calibrated(&mut self, resolution: f64) -> Result<Scored, DiagnoseError> {
         let scored = self.fitted(&Model::new(self.constants(), resolution, false))?;
         let scored = self.settle(scored)?;
-        let (chi2, runs) = self.chi2_to_judge_by(&scored);
-        self.unexplained = (chi2 / self.estimator.count(runs).max(1) as f64 - 1.0).max(0.0);
+        self.set_unexplained(&scored);
         Ok(scored)
     }
 
@@ -627,8 +626,14 @@ impl Search<'_> {
         Ok(if self.is_significant(&best, &scored) { best } else { scored })
     }
 
+    /// Sets what re-tuned constants leave to what `constants` leaves.
+    pub fn set_unexplained(&mut self, constants: &Scored) {
+        let (chi2, runs) = self.chi2_to_judge_by(constants);
+        self.unexplained = (chi2 / self.estimator.count(runs).max(1) as f64 - 1.0).max(0.0);
+    }
+
     /// What a model leaves, as a share of what re-tuned constants leave.
-    fn share_left(&self, scored: &Scored) -> f64 {
+    pub(super) fn share_left(&self, scored: &Scored) -> f64 {
         let (chi2, runs) = self.chi2_to_judge_by(scored);
         let left = chi2 / self.estimator.count(runs).max(1) as f64 - 1.0;
         if self.unexplained > 0.0 { left / self.unexplained } else { 1.0 }
