@@ -12,6 +12,8 @@ use super::search::{PROMISING_IN_PLACE, Scored, Search};
 
 /// A name stands if it takes this share of what the free form takes on held-out runs.
 const LEAST_TAKEN: f64 = 0.95;
+/// Held-out runs show a place if the free form takes there this share of what it takes in all, both per value.
+const LEAST_SHOWN: f64 = 0.1;
 /// Named candidates that are fitted in the stead of a free form.
 const MOST_NAMES: usize = 7;
 /// Names to which a second one is added, and second ones for each, where none stands alone.
@@ -154,10 +156,13 @@ impl<'a> Place<'a> {
         Ok(Some(alone).filter(|alone| self.taken(alone) >= LEAST_TAKEN))
     }
 
-    /// Share of what the free form takes on held-out runs that another model takes.
+    /// Share of what the free form takes on held-out runs that another model takes; on all runs where the held-out ones hardly show the place.
     fn taken(&self, scored: &Scored) -> f64 {
-        let below = |scored: &Scored| self.search.judged(&self.bare) - self.search.judged(scored);
-        below(scored) / below(&self.best).max(f64::MIN_POSITIVE)
+        let count = |runs: &[usize]| self.search.estimator.count(runs).max(1) as f64;
+        let whole = (self.bare.total() - self.best.total()) / count(&self.search.split.all());
+        let held = (self.bare.held - self.best.held) / count(&self.search.split.held);
+        let of = |scored: &Scored| if held > LEAST_SHOWN * whole { scored.held } else { scored.total() };
+        (of(&self.bare) - of(scored)) / (of(&self.bare) - of(&self.best)).max(f64::MIN_POSITIVE)
     }
 
     /// A model whose last term is the name; none if it cannot be fitted.

@@ -149,7 +149,7 @@ mod tests {
         let ratio = 0.5_f64;
         let mut second = SecondOrder { time: 0.02, inertia: 0.25 / (ratio * ratio), state: vec![[0.0; 2]] };
         let mut largest = 0.0_f64;
-        for _ in 0..4000 {
+        for _ in 0..16_000 {
             second.pass(5e-5, &mut [100.0]);
             largest = largest.max(second.state[0][0]);
         }
