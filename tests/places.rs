@@ -134,7 +134,7 @@ impl Plant for Bent {
 
     fn curve(&self, term: &Term) -> Option<FreeCurve> {
         let points = (0..=20).map(|k| 0.05 * f64::from(k)).map(|u| [u, hats(&term.x, u)]).collect();
-        self.candidates[term.candidate].is_free_form.then(|| FreeCurve { x: ["u", ""], y: ["c", ""], points })
+        self.candidates[term.candidate].is_free_form.then_some(FreeCurve { x: ["u", ""], y: ["c", ""], points })
     }
 
     fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {

@@ -401,6 +401,8 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
             search.set_unexplained(&start);
         }
     }
+    // What a name leaves, and what a cause takes, is no fault of the bench.
+    search.estimator.held_spread = Some(causes.best.model().spread);
     name_causes(search, &mut causes)?;
 
     (search.progress)("the final refit");
@@ -420,8 +422,6 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     }
     causes.open = causes.best.above(search.estimator.count(&search.split.all()));
     let before = causes.best.model().clone();
-    // What a name leaves is no fault of the bench.
-    search.estimator.held_spread = Some(before.spread);
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
     causes.nearest = nearest;
     causes.best = search.backward(best)?;
@@ -461,7 +461,8 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     best = search.backward(best)?;
     best = search.resolve(best)?;
     let share_left = search.share_left(&best);
-    if search.estimator.held_spread.take().is_some() {
+    // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
+    if share_left > SOUGHT && search.estimator.held_spread.take().is_some() {
         best = search.settle(best)?;
         best = search.backward(best)?;
     }
@@ -485,7 +486,8 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.settle(better)?;
         best = search.backward(best)?;
     }
-    if search.measure_noise(&best)? {
+    let faults_come_last = search.estimator.held_spread.take().is_some();
+    if search.measure_noise(&best)? || faults_come_last {
         best = search.settle(best)?;
     }
     let coarse_total = best.total();

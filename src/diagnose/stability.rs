@@ -58,8 +58,7 @@ fn stability(search: &Search, best: &Scored, without: &Scored, index: usize, scr
     let is_rival = |term: &Term| {
         let other = search.candidate(term);
         other.id != own.id
-            && !other.is_free_form
-            && !other.is_variant
+            && !(other.is_free_form || other.is_variant)
             && !(own.is_free_form && other.places.iter().any(|place| own.places.contains(place)))
     };
     let joined =
