@@ -28,6 +28,8 @@ const RELATIVE_TOLERANCE_TO_RANK: f64 = 2e-2;
 /// Most iterations: for full convergence, and to rank models.
 const MOST_ITERATIONS: usize = 25;
 const MOST_ITERATIONS_TO_RANK: usize = 8;
+/// Most steps with derivatives that follow the residuals.
+const MOST_STEPS: usize = 60;
 /// Values in a block over which residuals may be correlated.
 pub(super) const BLOCK: usize = 50;
 
@@ -48,6 +50,60 @@ pub enum Convergence {
 
 /// Nuisance parameters of every run.
 pub type Nuisances = Vec<Nuisance>;
+
+/// χ² about a model.
+struct Linearised {
+    /// Runs × values.
+    residuals: Vec<Residuals>,
+    /// Coordinates × runs × values.
+    derivatives: Vec<Vec<Residuals>>,
+    chi2: f64,
+    /// Half the gradient of χ².
+    gradient: DVector<f64>,
+    /// JᵀJ.
+    information: DMatrix<f64>,
+    /// False for derivatives that follow the residuals.
+    is_by_differences: bool,
+}
+
+/// A step to a lower χ².
+struct Step {
+    model: Model,
+    /// By coordinate.
+    by: DVector<f64>,
+    residuals: Vec<Residuals>,
+    chi2: f64,
+    /// The fall of χ² by the derivatives.
+    promised: f64,
+}
+
+impl Linearised {
+    fn new((residuals, derivatives): (Vec<Residuals>, Vec<Vec<Residuals>>)) -> Self {
+        let n = derivatives.len();
+        let chi2 = residuals.iter().map(|r| sum_of_squares(r)).sum();
+        let gradient = DVector::from_fn(n, |i, _| dot(&derivatives[i], &residuals));
+        let mut information = DMatrix::from_fn(n, n, |i, j| if i <= j { dot(&derivatives[i], &derivatives[j]) } else { 0.0 });
+        information.fill_lower_triangle_with_upper_triangle();
+        Self { residuals, derivatives, chi2, gradient, information, is_by_differences: true }
+    }
+
+    /// Moves to the end of a step: the least change of the derivatives, in units of what they do, that gives the residuals there (Broyden 1965).
+    fn follow(&mut self, step: Step) {
+        let weighted: Vec<f64> = step.by.iter().enumerate().map(|(k, by)| self.information[(k, k)] * by).collect();
+        let size: f64 = step.by.iter().zip(&weighted).map(|(by, weighted)| by * weighted).sum();
+        for (run, after) in step.residuals.iter().enumerate() {
+            for (value, after) in after.iter().enumerate() {
+                let promised: f64 = self.derivatives.iter().zip(step.by.iter()).map(|(column, by)| column[run][value] * by).sum();
+                let missed = (after - self.residuals[run][value] - promised) / size.max(f64::MIN_POSITIVE);
+                for (column, weighted) in self.derivatives.iter_mut().zip(&weighted) {
+                    column[run][value] += missed * weighted;
+                }
+            }
+        }
+        let derivatives = std::mem::take(&mut self.derivatives);
+        *self = Self { is_by_differences: false, ..Self::new((step.residuals, derivatives)) };
+    }
+}
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -225,14 +281,6 @@ impl<'a> Estimator<'a> {
         runs.par_iter().map(|run| self.residuals(model, *run)).collect()
     }
 
-    /// χ² of each of several runs.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if the model cannot be simulated.
-    pub fn chi2_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<f64>, DiagnoseError> {
-        Ok(self.residuals_of(model, runs)?.iter().map(|r| sum_of_squares(r)).collect())
-    }
-
     /// Number of values that count in several runs.
     pub fn count(&self, runs: &[usize]) -> usize {
         runs.iter().map(|run| self.used[*run].iter().filter(|used| **used).count()).sum()
@@ -284,6 +332,9 @@ impl<'a> Estimator<'a> {
     }
 
     /// [`fit`](Self::fit) with one coordinate, term and parameter, held.
+    ///
+    /// Between evaluations by finite differences the derivatives follow the residuals by Broyden's update (1965), as long as steps lower χ² by half
+    /// of what they promise; a full fit ends with derivatives by finite differences.
     fn fit_held(
         &self,
         start: &Model,
@@ -295,76 +346,100 @@ impl<'a> Estimator<'a> {
             Convergence::Rank => (RELATIVE_TOLERANCE_TO_RANK, MOST_ITERATIONS_TO_RANK),
             Convergence::Full => (RELATIVE_TOLERANCE, MOST_ITERATIONS),
         };
-        let mut model = start.clone();
-        let coordinates = coordinates(&model);
         let count = self.count(runs);
-        let n = coordinates.len();
+        let least = |chi2: f64| (tolerance * (chi2 - count as f64).max(TOLERANCE * count as f64)).max(TOLERANCE * count as f64);
+        let mut model = start.clone();
+        let mut here = Linearised::new(self.linearised(&model, runs)?);
         let mut lambda = 1e-3;
-        let mut chi2 = f64::INFINITY;
-        let mut information = DMatrix::zeros(n, n);
-        let mut iterations = 0;
-        'iterations: while iterations < most {
-            iterations += 1;
-            let (residuals, derivatives) = self.linearised(&model, runs)?;
-            chi2 = residuals.iter().map(|r| sum_of_squares(r)).sum();
-            let gradient = DVector::from_fn(n, |i, _| dot(&derivatives[i], &residuals));
-            information = DMatrix::from_fn(n, n, |i, j| if i <= j { dot(&derivatives[i], &derivatives[j]) } else { 0.0 });
-            information.fill_lower_triangle_with_upper_triangle();
-            if n == 0 {
-                break;
+        let (mut linearisations, mut steps) = (1, 0);
+        loop {
+            steps += 1;
+            let better = self.step_down(&model, &here, runs, fixed, &mut lambda);
+            let (is_done, is_trusted) = match &better {
+                Some(step) => {
+                    let gain = here.chi2 - step.chi2;
+                    (gain < least(step.chi2), gain > 0.5 * step.promised && steps < MOST_STEPS)
+                }
+                None => (true, false),
+            };
+            let is_last = is_done && (here.is_by_differences || (convergence == Convergence::Rank && better.is_some()));
+            if let Some(step) = better {
+                let chi2 = step.chi2;
+                model = step.model.clone();
+                if is_last || (linearisations == most && !is_trusted) {
+                    return Ok(Fit { model, chi2, count, information: here.information });
+                }
+                if is_trusted && !is_done {
+                    here.follow(step);
+                    continue;
+                }
+            } else if is_last || linearisations == most {
+                return Ok(Fit { model, chi2: here.chi2, count, information: here.information });
             }
-            loop {
-                // Coordinates at a bound with the gradient pointing outwards are held.
-                let bounds = |k: usize| {
-                    self.plant.candidates()[model.terms[coordinates[k].0].candidate].parameters[coordinates[k].1].bounds
-                };
-                let x = |k: usize| model.terms[coordinates[k].0].x[coordinates[k].1];
-                let held: Vec<bool> = (0..n)
-                    .map(|k| {
-                        let [low, high] = bounds(k);
-                        Some(coordinates[k]) == fixed || (x(k) <= low && gradient[k] > 0.0) || (x(k) >= high && gradient[k] < 0.0)
-                    })
-                    .collect();
-                let mut matrix = information.clone();
-                let mut right = -gradient.clone();
-                for k in 0..n {
-                    matrix[(k, k)] += lambda * information[(k, k)].max(1e-12);
-                    if held[k] || information[(k, k)] <= 0.0 {
-                        (0..n).for_each(|j| {
-                            matrix[(k, j)] = 0.0;
-                            matrix[(j, k)] = 0.0;
-                        });
-                        matrix[(k, k)] = 1.0;
-                        right[k] = 0.0;
-                    }
+            here = Linearised::new(self.linearised(&model, runs)?);
+            linearisations += 1;
+        }
+    }
+
+    /// The first of the steps of Levenberg and Marquardt, with more and more damping `lambda`, that lowers χ²; only one step where the derivatives are
+    /// not by differences. Coordinates at a bound with the gradient pointing outwards are held.
+    fn step_down(
+        &self,
+        model: &Model,
+        here: &Linearised,
+        runs: &[usize],
+        fixed: Option<(usize, usize)>,
+        lambda: &mut f64,
+    ) -> Option<Step> {
+        let coordinates = coordinates(model);
+        let n = coordinates.len();
+        if n == 0 {
+            return None;
+        }
+        let bounds = |k: usize| {
+            let (term, parameter) = coordinates[k];
+            self.plant.candidates()[model.terms[term].candidate].parameters[parameter].bounds
+        };
+        let x = |k: usize| model.terms[coordinates[k].0].x[coordinates[k].1];
+        let Linearised { information, gradient, .. } = here;
+        let is_held = |k: usize| {
+            let [low, high] = bounds(k);
+            let leads_out = (x(k) <= low && gradient[k] > 0.0) || (x(k) >= high && gradient[k] < 0.0);
+            Some(coordinates[k]) == fixed || leads_out || information[(k, k)] <= 0.0
+        };
+        let held: Vec<bool> = (0..n).map(is_held).collect();
+        loop {
+            let damped = |i: usize, j: usize| match i == j {
+                true if held[i] => 1.0,
+                true => information[(i, i)] + *lambda * information[(i, i)].max(1e-12),
+                false if held[i] || held[j] => 0.0,
+                false => information[(i, j)],
+            };
+            let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
+            let by = DMatrix::from_fn(n, n, damped).lu().solve(&right)?;
+            let mut trial = model.clone();
+            for (k, (term, parameter)) in coordinates.iter().enumerate() {
+                let [low, high] = bounds(k);
+                let slot = &mut trial.terms[*term].x[*parameter];
+                *slot = (*slot + by[k]).clamp(low, high);
+            }
+            let by = DVector::from_fn(n, |k, _| trial.terms[coordinates[k].0].x[coordinates[k].1] - x(k));
+            if let Ok(residuals) = self.residuals_of(&trial, runs) {
+                let chi2: f64 = residuals.iter().map(|r| sum_of_squares(r)).sum();
+                if chi2 < here.chi2 {
+                    *lambda = (*lambda * 0.1).max(1e-9);
+                    let promised = -2.0 * gradient.dot(&by) - by.dot(&(information * &by));
+                    return Some(Step { model: trial, by, residuals, chi2, promised });
                 }
-                let Some(step) = matrix.lu().solve(&right) else { break 'iterations };
-                let mut trial = model.clone();
-                for (k, (term, parameter)) in coordinates.iter().enumerate() {
-                    let [low, high] = bounds(k);
-                    let slot = &mut trial.terms[*term].x[*parameter];
-                    *slot = (*slot + step[k]).clamp(low, high);
-                }
-                let found = self.chi2_of(&trial, runs).map_or(f64::INFINITY, |each| each.iter().sum());
-                if found < chi2 {
-                    let gain = chi2 - found;
-                    model = trial;
-                    chi2 = found;
-                    lambda = (lambda * 0.1).max(1e-9);
-                    if gain < TOLERANCE * count as f64
-                        || gain < tolerance * (found - count as f64).max(0.0).max(TOLERANCE * count as f64)
-                    {
-                        break 'iterations;
-                    }
-                    break;
-                }
-                lambda *= 10.0;
-                if lambda > 1e6 || trial == model {
-                    break 'iterations;
-                }
+            }
+            if !here.is_by_differences || trial == *model {
+                return None;
+            }
+            *lambda *= 10.0;
+            if *lambda > 1e6 {
+                return None;
             }
         }
-        Ok(Fit { model, chi2, count, information })
     }
 
     /// Profile χ²: the coordinate `held` (term, parameter) is fixed and all others are fitted, to the convergence of [`Convergence::Rank`].

@@ -43,7 +43,11 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
             _ => String::new(),
         },
         "field-dependent-gain" => fitted.find(|name| *name == "exponent").map_or("", |_| "as a power").into(),
-        "driver-lag" => fitted.find(|name| *name == "inertia").map_or("", |_| "of second order").into(),
+        "driver-lag" => match fitted.nth(1) {
+            Some("rising") => "with another time constant of rising voltages".into(),
+            Some(_) => "of second order".into(),
+            None => String::new(),
+        },
         "slew-limit" => match fitted.nth(1) {
             Some("rising") => "with another rate of rising voltages".into(),
             Some(_) => "approached softly".into(),
@@ -97,6 +101,7 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("slew-limit", "linear_s") => "time constant of small changes".into(),
         ("slew-limit", _) => "largest rate".into(),
         ("driver-lag", "inertia") => "inertia of the driver".into(),
+        ("driver-lag", "rising") => "time constant of rising voltages over that of falling ones".into(),
         ("field-dependent-gain", "reference_v") => "voltage of nominal gain".into(),
         ("ground-friction", _) => "factor on the friction".into(),
         ("sensor-scale", _) => "scale of the camera".into(),

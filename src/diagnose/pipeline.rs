@@ -407,7 +407,7 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
 
     (search.progress)("the final refit");
     let mut best = search.fitted(&Model { fine: true, ..causes.best.model().clone() })?;
-    best = search.resolve(best)?;
+    best = search.resolve(best);
     best = search.backward(best)?;
     causes.best = search.settle(best)?;
     Ok(causes)
@@ -457,9 +457,9 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     if spikes > 0 {
         best = search.settle(best)?;
     }
-    best = search.resolve(best)?;
+    best = search.resolve(best);
     best = search.backward(best)?;
-    best = search.resolve(best)?;
+    best = search.resolve(best);
     let share_left = search.share_left(&best);
     // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
     if share_left > SOUGHT && search.estimator.held_spread.take().is_some() {
@@ -483,7 +483,8 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
             .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
             .map(|(_, trial)| trial.scored.clone());
         let Some(better) = better else { break };
-        best = search.settle(better)?;
+        // A cause in a constant's place lets the constant stay free beside it.
+        best = search.settle(search.fitted(&search.with_constants(better.model()))?)?;
         best = search.backward(best)?;
     }
     let faults_come_last = search.estimator.held_spread.take().is_some();

@@ -343,12 +343,17 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn screen(&self, from: &Scored) -> Result<Screened, DiagnoseError> {
+        self.screen_of(from, |_| true)
+    }
+
+    /// [`screen`](Self::screen) of those candidates that are wanted.
+    fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
         let runs = self.split.all();
         let base = from.model();
         let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
         let candidates = self.estimator.plant.candidates();
         let mut starts = Vec::new();
-        for (candidate, c) in candidates.iter().enumerate().filter(|(_, c)| !used.contains(&c.id)) {
+        for (candidate, c) in candidates.iter().enumerate().filter(|(_, c)| is_wanted(c) && !used.contains(&c.id)) {
             starts.extend(c.starts.iter().map(|x| Term { candidate, x: x.clone() }));
         }
         let plain = DVector::from_vec(runs.iter().flat_map(|run| from.residuals[*run].clone()).collect());
@@ -563,10 +568,7 @@ impl Search<'_> {
             };
             let worthy = match top.filter(|top| self.is_worth(top, &best)) {
                 Some(top) => Some(top),
-                None => match self.seen_by_fit_runs(&mut best, &trials)? {
-                    Some(seen) => Some(seen),
-                    None => self.both(&screened, &best),
-                },
+                None => self.seen_by_fit_runs(&mut best, &trials).or_else(|| self.both(&screened, &best)),
             };
             if let Some(worthy) = &worthy {
                 (self.progress)(&self.adopting(worthy, &best));
@@ -577,7 +579,7 @@ impl Search<'_> {
             };
             // The discretisation and the laws are refined before another cause could take their errors.
             let settled = self.settle(worthy)?;
-            best = self.resolve(settled)?;
+            best = self.resolve(settled);
             for index in 0..best.model().terms.len() {
                 best = self.with_its_law(best, index)?;
             }
@@ -669,27 +671,25 @@ impl Search<'_> {
 
     /// A cause that shows in fit runs only: the run that it improves most is held out as well, and the cause, fitted to the others, has to improve it
     /// too. Keeps the new split if it does.
-    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Result<Option<Scored>, DiagnoseError> {
+    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
         let named = trials.iter().filter(|trial| !self.ends_free(trial.scored.model()));
-        let Some(trial) = named.min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted)) else { return Ok(None) };
+        let trial = named.min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted))?;
         let gain = |run: &usize| sum_of_squares(&base.residuals[*run]) - sum_of_squares(&trial.scored.residuals[*run]);
         let most = self.split.fit.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b)));
-        let Some(run) = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base)) else {
-            return Ok(None);
-        };
+        let run = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base))?;
         (self.progress)(&format!("{} on another split", self.id(trial.candidate)));
         let before = self.split.clone();
         self.split.fit.retain(|other| *other != run);
         self.split.held.push(run);
         self.split.held.sort_unstable();
-        let plain = self.fitted(base.model())?;
-        let with = self.fitted(trial.scored.model())?;
-        if self.is_worth(&with, &plain) {
+        if let (Ok(plain), Ok(with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
+            && self.is_worth(&with, &plain)
+        {
             *base = plain;
-            return Ok(Some(with));
+            return Some(with);
         }
         self.split = before;
-        Ok(None)
+        None
     }
 
     /// Backward elimination: removes terms that are not worth it, the least needed first.
@@ -712,9 +712,10 @@ impl Search<'_> {
                 best = self.fitted(shorter(idle)?.model())?;
                 continue;
             }
-            let shorter = self.least_significant(&best).into_iter().map(shorter).collect::<Result<Vec<_>, _>>()?;
-            let Some(least) = shorter.into_iter().min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(best) };
-            let least = self.fitted(least.model())?;
+            // A term without which the model diverges is needed.
+            let shorter = self.least_significant(&best).into_iter().filter_map(|index| shorter(index).ok());
+            let least = shorter.min_by(|a, b| a.total().total_cmp(&b.total()));
+            let Some(Ok(least)) = least.map(|least| self.fitted(least.model())) else { return Ok(best) };
             if self.is_needed(&best, &least) || self.is_seen_by_fit(&best, &least) {
                 return Ok(best);
             }
@@ -752,7 +753,7 @@ impl Search<'_> {
     /// Replaces every cause by other candidates, `most` of each: the index of the term, and the trial.
     ///
     /// # Errors
-    /// [`DiagnoseError`] if a model without one of its causes cannot be simulated.
+    /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         for index in 0..best.model().terms.len() {
@@ -760,11 +761,11 @@ impl Search<'_> {
             let removed = model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
-            let without = self.fitted_at_its_spread(&model)?;
-            let screened = self.screen(&without)?.ranked;
+            let Ok(without) = self.fitted_at_its_spread(&model) else { continue };
+            let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?.ranked;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();
-            let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m) && !self.ends_free(m);
+            let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m);
             let others = screened.iter().filter(is_promising);
             for model in self.finalists(others, most) {
                 let Some(term) = model.terms.last() else { continue };
@@ -778,21 +779,19 @@ impl Search<'_> {
     }
 
     /// The discretisation with the least χ² over all runs, by steps from the present one.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if a model cannot be simulated.
-    pub fn resolve(&mut self, best: Scored) -> Result<Scored, DiagnoseError> {
+    pub fn resolve(&self, best: Scored) -> Scored {
         let resolutions = self.estimator.plant.resolutions();
         let mut best = best;
         let mut tried = vec![best.model().resolution];
         loop {
-            let Some(at) = resolutions.iter().position(|r| *r == best.model().resolution) else { return Ok(best) };
+            let Some(at) = resolutions.iter().position(|r| *r == best.model().resolution) else { return best };
             let neighbours = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter_map(|k| resolutions.get(k).copied());
             let mut moved = false;
             for resolution in neighbours.filter(|r| !tried.contains(r)).collect::<Vec<_>>() {
                 tried.push(resolution);
                 (self.progress)(&format!("{resolution} joints per actuator"));
-                let other = self.fitted(&Model { resolution, ..best.model().clone() })?;
+                // A discretisation in which the model diverges is none for it.
+                let Ok(other) = self.fitted(&Model { resolution, ..best.model().clone() }) else { continue };
                 if other.total() < best.total() {
                     best = other;
                     moved = true;
@@ -800,7 +799,7 @@ impl Search<'_> {
                 }
             }
             if !moved {
-                return Ok(best);
+                return best;
             }
         }
     }

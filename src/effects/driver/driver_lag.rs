@@ -1,12 +1,13 @@
 //! The source's resistance charges the actuator's capacitance.
 //!
 //! ```text
-//! b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C
+//! b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C;  r·T where V_c > V_a
 //! ```
 //!
 //! # Parameters
 //! * `time_constant_s` (s): time constant T
 //! * `inertia` (–): b: 0 is a resistance and a capacitance, ¼ two equal ones in a row; above ¼ the amplifier overshoots
+//! * `rising` (–): r: time constant of rising voltages over that of falling ones, of a source and a sink of different resistance
 //!
 //! # Source
 //! Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems.
@@ -19,7 +20,7 @@ pub const DRIVER_LAG: Effect = Effect {
     id: "driver-lag",
     kind: Kind::Driver,
     cause: "The source's resistance charges the actuator's capacitance.",
-    equation: "b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C",
+    equation: "b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C;  r·T where V_c > V_a",
     source: "Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems.",
     parameters: &[
         Parameter {
@@ -38,21 +39,36 @@ pub const DRIVER_LAG: Effect = Effect {
             default: Some(0.0),
             about: "b: 0 is a resistance and a capacitance, ¼ two equal ones in a row; above ¼ the amplifier overshoots",
         },
+        Parameter {
+            name: "rising",
+            unit: "",
+            bounds: [0.05, 20.0],
+            off: None,
+            default: Some(1.0),
+            about: "r: time constant of rising voltages over that of falling ones, of a source and a sink of different resistance",
+        },
     ],
     places: &[Place::Drive],
     fitting: Fitting::Candidate {
         on: fits::any,
-        variants: &[Form {
-            fitted: &[("time_constant_s", 0.002), ("inertia", 0.2)],
-            starts: &[&[0.001, 0.3], &[0.005, 0.3]],
-            given: &[],
-        }],
+        variants: &[
+            Form {
+                fitted: &[("time_constant_s", 0.002), ("inertia", 0.2)],
+                starts: &[&[0.001, 0.3], &[0.005, 0.3]],
+                given: &[],
+            },
+            Form {
+                fitted: &[("time_constant_s", 0.002), ("rising", 0.3)],
+                starts: &[&[0.001, 2.0], &[0.001, 0.5], &[0.005, 2.0], &[0.005, 0.5]],
+                given: &[],
+            },
+        ],
         forms: &[Form { fitted: &[("time_constant_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
     },
     shape: None,
     action: Action::Voltages(|p, n, _| match *p {
-        [time, inertia] if inertia > 0.0 => Box::new(SecondOrder { time, inertia, state: vec![[0.0; 2]; n] }),
-        _ => Box::new(Follower::new(Lag { time: p[0] }, n)),
+        [time, inertia, rising] if inertia > 0.0 => Box::new(SecondOrder { time, inertia, rising, state: vec![[0.0; 2]; n] }),
+        _ => Box::new(Follower::new(Lag { time: p[0], rising: p[2] }, n)),
     }),
 };
 
@@ -60,42 +76,58 @@ pub const DRIVER_LAG: Effect = Effect {
 struct Lag {
     /// T (s).
     time: f64,
+    /// r.
+    rising: f64,
 }
 
 impl Law for Lag {
     fn follow(&self, dt: f64, state: &mut [f64], volts: &mut [f64]) {
-        let steps = dt / self.time;
         // 1 − exp(−dt/T), and its mean over the step.
-        let gone = -(-steps).exp_m1();
-        let mean = gone / steps;
+        let relaxed = |time: f64| {
+            let gone = -(-dt / time).exp_m1();
+            [gone, gone * time / dt]
+        };
+        let (rising, falling) = (relaxed(self.rising * self.time), relaxed(self.time));
         for (state, volts) in state.iter_mut().zip(volts) {
             let away = *state - *volts;
+            let [gone, mean] = if away < 0.0 { rising } else { falling };
             *state = *volts + away * (1.0 - gone);
             *volts += away * mean;
         }
     }
 }
 
-/// The state is the voltage and T times its rate (V) at the end of the last step; exact for voltages that are constant over a step.
+/// The state is the voltage and T times its rate (V) at the end of the last step; exact for voltages that are constant over a step and not crossed
+/// within it.
 struct SecondOrder {
     /// T (s).
     time: f64,
     /// b.
     inertia: f64,
+    /// r.
+    rising: f64,
     state: Vec<[f64; 2]>,
 }
 
-impl SignalStage for SecondOrder {
-    fn settle(&mut self, volts: &mut [f64]) {
-        self.state.iter_mut().zip(volts).for_each(|(state, volts)| *state = [*volts, 0.0]);
-    }
+/// The exponential of the equation's matrix over a step, in units of T.
+#[derive(Clone, Copy)]
+struct Step {
+    /// The step over T.
+    length: f64,
+    /// Half the decay's rate.
+    m: f64,
+    /// C and S of exp(A s) = C·1 + S·(A + m·1).
+    cosine: f64,
+    sine: f64,
+}
 
-    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
-        // exp(A s) = C·1 + S·(A + m·1) for A = [0, 1; −1/b, −1/b] with the mean −m and the squared half distance q² of its eigenvalues.
-        let (s, b) = (dt / self.time, self.inertia);
+impl Step {
+    fn new(length: f64, b: f64) -> Self {
+        // A = [0, 1; −1/b, −1/b] with the mean −m and the squared half distance q² of its eigenvalues.
         let m = 0.5 / b;
         let q2 = m * m - 1.0 / b;
         let q = q2.abs().sqrt();
+        let s = length;
         let [cosine, sine] = if q * s < 1e-6 {
             [(-m * s).exp(), s * (-m * s).exp()]
         } else if q2 > 0.0 {
@@ -104,12 +136,27 @@ impl SignalStage for SecondOrder {
         } else {
             [(-m * s).exp() * (q * s).cos(), (-m * s).exp() * (q * s).sin() / q]
         };
+        Self { length, m, cosine, sine }
+    }
+}
+
+impl SignalStage for SecondOrder {
+    fn settle(&mut self, volts: &mut [f64]) {
+        self.state.iter_mut().zip(volts).for_each(|(state, volts)| *state = [*volts, 0.0]);
+    }
+
+    fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+        let b = self.inertia;
+        let falling = Step::new(dt / self.time, b);
+        let rising = if self.rising == 1.0 { falling } else { Step::new(falling.length / self.rising, b) };
         for ([voltage, rate], volts) in self.state.iter_mut().zip(volts) {
             let away = *voltage - *volts;
-            let next = [cosine * away + sine * (m * away + *rate), cosine * *rate - sine * (away / b + m * *rate)];
+            let (Step { length, m, cosine, sine }, ratio) = if away < 0.0 { (rising, self.rising) } else { (falling, 1.0) };
+            let own = ratio * *rate;
+            let next = [cosine * away + sine * (m * away + own), cosine * own - sine * (away / b + m * own)];
             // The integral of the equation over the step.
-            let mean = -(b * (next[1] - *rate) + next[0] - away) / s;
-            [*voltage, *rate] = [*volts + next[0], next[1]];
+            let mean = -(b * (next[1] - own) + next[0] - away) / length;
+            [*voltage, *rate] = [*volts + next[0], next[1] / ratio];
             *volts += mean;
         }
     }
@@ -129,7 +176,7 @@ mod tests {
 
     #[test]
     fn two_equal_lags_in_a_row_are_an_inertia_of_a_quarter() {
-        let mut second = SecondOrder { time: 0.02, inertia: 0.25, state: vec![[0.0; 2]] };
+        let mut second = SecondOrder { time: 0.02, inertia: 0.25, rising: 1.0, state: vec![[0.0; 2]] };
         let mut sum = 0.0;
         for _ in 0..25 {
             let mut volts = [100.0];
@@ -147,7 +194,7 @@ mod tests {
     fn an_amplifier_that_overshoots_does_so_by_its_damping_ratio() {
         // b T² = 1/ω², T = 2 ζ/ω: b = 1/(4 ζ²).
         let ratio = 0.5_f64;
-        let mut second = SecondOrder { time: 0.02, inertia: 0.25 / (ratio * ratio), state: vec![[0.0; 2]] };
+        let mut second = SecondOrder { time: 0.02, inertia: 0.25 / (ratio * ratio), rising: 1.0, state: vec![[0.0; 2]] };
         let mut largest = 0.0_f64;
         for _ in 0..16_000 {
             second.pass(5e-5, &mut [100.0]);
@@ -159,8 +206,25 @@ mod tests {
     }
 
     #[test]
+    fn a_source_and_a_sink_may_differ() {
+        let mut lag = Follower::new(Lag { time: 0.02, rising: 0.5 }, 1);
+        (0..25).for_each(|_| lag.pass(1e-3, &mut [100.0]));
+        let risen = 100.0 * (1.0 - (-2.5_f64).exp());
+        assert!((lag.state()[0] - risen).abs() < 1e-12);
+        (0..25).for_each(|_| lag.pass(1e-3, &mut [0.0]));
+        assert!((lag.state()[0] - risen * (-1.25_f64).exp()).abs() < 1e-12);
+        let settled = |rising: f64, to: f64| {
+            let mut second = SecondOrder { time: 0.02, inertia: 0.2, rising, state: vec![[0.0; 2]] };
+            (0..25).for_each(|_| second.pass(1e-3, &mut [to]));
+            second.state[0][0]
+        };
+        assert!((settled(0.5, 100.0) - settled(1.0, 100.0)).abs() > 1.0);
+        assert!((settled(0.5, -100.0) - settled(1.0, -100.0)).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_step_response_is_the_exponential() {
-        let mut lag = Follower::new(Lag { time: 0.01 }, 1);
+        let mut lag = Follower::new(Lag { time: 0.01, rising: 1.0 }, 1);
         for _ in 0..25 {
             lag.pass(1e-3, &mut [100.0]);
         }
