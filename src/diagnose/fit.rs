@@ -55,14 +55,13 @@ pub type Nuisances = Vec<Nuisance>;
 struct Linearised {
     /// Runs × values.
     residuals: Vec<Residuals>,
-    /// Coordinates × runs × values.
-    derivatives: Vec<Vec<Residuals>>,
+    derivatives: Derivatives,
     chi2: f64,
     /// Half the gradient of χ².
     gradient: DVector<f64>,
     /// JᵀJ.
     information: DMatrix<f64>,
-    /// False for derivatives that follow the residuals.
+    /// False for derivatives from a model close by or that follow the residuals.
     is_by_differences: bool,
 }
 
@@ -78,13 +77,13 @@ struct Step {
 }
 
 impl Linearised {
-    fn new((residuals, derivatives): (Vec<Residuals>, Vec<Vec<Residuals>>)) -> Self {
+    fn new((residuals, derivatives): (Vec<Residuals>, Derivatives), is_by_differences: bool) -> Self {
         let n = derivatives.len();
         let chi2 = residuals.iter().map(|r| sum_of_squares(r)).sum();
         let gradient = DVector::from_fn(n, |i, _| dot(&derivatives[i], &residuals));
         let mut information = DMatrix::from_fn(n, n, |i, j| if i <= j { dot(&derivatives[i], &derivatives[j]) } else { 0.0 });
         information.fill_lower_triangle_with_upper_triangle();
-        Self { residuals, derivatives, chi2, gradient, information, is_by_differences: true }
+        Self { residuals, derivatives, chi2, gradient, information, is_by_differences }
     }
 
     /// Moves to the end of a step: the least change of the derivatives, in units of what they do, that gives the residuals there (Broyden 1965).
@@ -101,7 +100,7 @@ impl Linearised {
             }
         }
         let derivatives = std::mem::take(&mut self.derivatives);
-        *self = Self { is_by_differences: false, ..Self::new((step.residuals, derivatives)) };
+        *self = Self::new((step.residuals, derivatives), false);
     }
 }
 
@@ -181,6 +180,9 @@ fn key(model: &Model, run: usize, nuisance: &Nuisance) -> Vec<u64> {
 
 /// Residuals of a run, in σ, 0 for values that do not count; behind those of the values, the bench's faults in their standard deviations.
 pub type Residuals = Vec<f64>;
+
+/// Derivatives of residuals: coordinates × runs × values.
+pub(super) type Derivatives = Vec<Vec<Residuals>>;
 
 impl<'a> Estimator<'a> {
     /// A plant with all values, and shares of 1: a command is held until the row that shows its change.
@@ -294,9 +296,22 @@ impl<'a> Estimator<'a> {
         if x + step > free.bounds[1] { -step } else { step }
     }
 
-    /// Residuals (runs × values) and their derivatives (coordinates × runs × values).
-    fn linearised(&self, model: &Model, runs: &[usize]) -> Result<(Vec<Residuals>, Vec<Vec<Residuals>>), DiagnoseError> {
-        let coordinates = coordinates(model);
+    /// Derivatives of the residuals (coordinates × runs × values) by a model's coordinates.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a step of the finite differences cannot be simulated.
+    pub(super) fn derivatives(&self, model: &Model, runs: &[usize]) -> Result<Derivatives, DiagnoseError> {
+        Ok(self.linearised(model, runs, &[])?.1)
+    }
+
+    /// Residuals (runs × values) and their derivatives (coordinates × runs × values), of which those by the first coordinates may be `known`.
+    fn linearised(
+        &self,
+        model: &Model,
+        runs: &[usize],
+        known: &[Vec<Residuals>],
+    ) -> Result<(Vec<Residuals>, Derivatives), DiagnoseError> {
+        let coordinates = &coordinates(model)[known.len()..];
         let tasks: Vec<(usize, usize)> =
             (0..=coordinates.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
         let results: Vec<Residuals> = tasks
@@ -312,14 +327,12 @@ impl<'a> Estimator<'a> {
             .collect::<Result<_, _>>()?;
         let mut columns = results.chunks(runs.len()).map(<[Residuals]>::to_vec);
         let plain = columns.next().unwrap_or_default();
-        let derivatives = columns
-            .zip(&coordinates)
-            .map(|(shifted, coordinate)| {
-                let step = self.step(model, *coordinate);
-                let of_run = |(a, b): (&Residuals, &Residuals)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect();
-                shifted.iter().zip(&plain).map(of_run).collect()
-            })
-            .collect();
+        let own = columns.zip(coordinates).map(|(shifted, coordinate)| {
+            let step = self.step(model, *coordinate);
+            let of_run = |(a, b): (&Residuals, &Residuals)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect();
+            shifted.iter().zip(&plain).map(of_run).collect()
+        });
+        let derivatives = known.iter().cloned().chain(own).collect();
         Ok((plain, derivatives))
     }
 
@@ -328,7 +341,15 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if `start` or a step of the finite differences cannot be simulated.
     pub fn fit(&self, start: &Model, runs: &[usize], convergence: Convergence) -> Result<Fit, DiagnoseError> {
-        self.fit_held(start, runs, convergence, None)
+        self.fit_held(start, runs, convergence, None, &[])
+    }
+
+    /// [`fit`](Self::fit) to the convergence of [`Convergence::Rank`] with the derivatives by the first coordinates `known` from a model close by.
+    ///
+    /// # Errors
+    /// As [`fit`](Self::fit).
+    pub(super) fn fit_beyond(&self, start: &Model, runs: &[usize], known: &[Vec<Residuals>]) -> Result<Fit, DiagnoseError> {
+        self.fit_held(start, runs, Convergence::Rank, None, known)
     }
 
     /// [`fit`](Self::fit) with one coordinate, term and parameter, held.
@@ -341,6 +362,7 @@ impl<'a> Estimator<'a> {
         runs: &[usize],
         convergence: Convergence,
         fixed: Option<(usize, usize)>,
+        known: &[Vec<Residuals>],
     ) -> Result<Fit, DiagnoseError> {
         let (tolerance, most) = match convergence {
             Convergence::Rank => (RELATIVE_TOLERANCE_TO_RANK, MOST_ITERATIONS_TO_RANK),
@@ -349,7 +371,7 @@ impl<'a> Estimator<'a> {
         let count = self.count(runs);
         let least = |chi2: f64| (tolerance * (chi2 - count as f64).max(TOLERANCE * count as f64)).max(TOLERANCE * count as f64);
         let mut model = start.clone();
-        let mut here = Linearised::new(self.linearised(&model, runs)?);
+        let mut here = Linearised::new(self.linearised(&model, runs, known)?, known.is_empty());
         let mut lambda = 1e-3;
         let (mut linearisations, mut steps) = (1, 0);
         loop {
@@ -376,7 +398,7 @@ impl<'a> Estimator<'a> {
             } else if is_last || linearisations == most {
                 return Ok(Fit { model, chi2: here.chi2, count, information: here.information });
             }
-            here = Linearised::new(self.linearised(&model, runs)?);
+            here = Linearised::new(self.linearised(&model, runs, &[])?, true);
             linearisations += 1;
         }
     }
@@ -447,7 +469,7 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if `start` cannot be simulated.
     pub fn profile(&self, start: &Model, held: (usize, usize), runs: &[usize]) -> Result<f64, DiagnoseError> {
-        Ok(self.fit_held(start, runs, Convergence::Rank, Some(held))?.chi2)
+        Ok(self.fit_held(start, runs, Convergence::Rank, Some(held), &[])?.chi2)
     }
 
     /// Variance inflation of each coordinate over that of independent noise, by the sandwich estimator: C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against
@@ -458,7 +480,7 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn inflation(&self, model: &Model, runs: &[usize], covariance: &DMatrix<f64>) -> Result<Vec<f64>, DiagnoseError> {
-        let (residuals, derivatives) = self.linearised(model, runs)?;
+        let (residuals, derivatives) = self.linearised(model, runs, &[])?;
         let n = derivatives.len();
         let ratios = |block: usize| -> Vec<f64> {
             let mut meat = DMatrix::zeros(n, n);

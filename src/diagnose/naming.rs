@@ -7,7 +7,7 @@
 
 use super::DiagnoseError;
 use super::diagnosis::Nearest;
-use super::plant::{Model, Term};
+use super::plant::{Candidate, Model, Term};
 use super::search::{PROMISING_IN_PLACE, Scored, Search};
 
 /// A name stands if it takes this share of what the free form takes on held-out runs.
@@ -102,7 +102,7 @@ impl<'a> Place<'a> {
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
     fn single(&self) -> Result<Vec<Attempt>, DiagnoseError> {
-        let screened = self.search.screen(&self.bare)?.ranked;
+        let screened = self.search.screen_of(&self.bare, |candidate| self.is_name(candidate))?.ranked;
         let own = PROMISING_IN_PLACE * (self.bare.total() - self.best.total());
         let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| self.is_rival(model)).collect();
         // The nearest one is shown even if it is far.
@@ -138,7 +138,7 @@ impl<'a> Place<'a> {
             }
         }
         for first in firsts {
-            let screened = self.search.screen(&first.scored)?.ranked;
+            let screened = self.search.screen_of(&first.scored, |candidate| self.is_name(candidate))?.ranked;
             let rivals = screened.iter().filter(|(_, model)| self.is_rival(model));
             pairs.extend(self.search.finalists(rivals, MOST_SECOND).iter().filter_map(|model| self.attempt(model)));
         }
@@ -173,13 +173,23 @@ impl<'a> Place<'a> {
         Some(Attempt { name, taken: self.taken(&scored), scored })
     }
 
+    /// True for named causes of the place.
+    fn is_name(&self, candidate: &Candidate) -> bool {
+        !candidate.is_free_form && is_of_place(self.search, &self.free, candidate)
+    }
+
     /// True if a model's last term is a named cause of the place.
     fn is_rival(&self, model: &Model) -> bool {
-        model.terms.last().is_some_and(|term| !self.search.candidate(term).is_free_form && is_of(self.search, &self.free, term))
+        model.terms.last().is_some_and(|term| self.is_name(self.search.candidate(term)))
     }
+}
+
+/// True if a candidate acts at a place of the free form.
+fn is_of_place(search: &Search, free: &Term, candidate: &Candidate) -> bool {
+    candidate.places.iter().any(|place| search.candidate(free).places.contains(place))
 }
 
 /// True if a term acts at a place of the free form.
 fn is_of(search: &Search, free: &Term, term: &Term) -> bool {
-    search.candidate(term).places.iter().any(|place| search.candidate(free).places.contains(place))
+    is_of_place(search, free, search.candidate(term))
 }

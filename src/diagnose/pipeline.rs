@@ -19,9 +19,9 @@ use super::summary::{Findings, failing, summary};
 const SEARCH_RESOLUTION: f64 = 10.0;
 /// Structure is left if χ² per value exceeds 1 by this (a misfit of σ/2), ...
 const LEFT_OVER: f64 = 0.25;
-/// ... and by this share of what the refined nominal model leaves: true causes with other equations than the library's leave 0.6 % at most. For n
+/// ... and nothing is explained if it is by this share of what the refined nominal model leaves: a name stands with 95 % of what its place takes. For n
 /// causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
-const LEFT_SHARE: f64 = 0.02;
+const LEFT_SHARE: f64 = 0.05;
 /// Causes are minor that together remove no more than this share, ...
 const MINOR_SHARE: f64 = 0.02;
 /// ... and those that remove less than this of χ² per value: half the noise.
@@ -155,7 +155,7 @@ pub fn diagnose(
         (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
         _ => None,
     };
-    let has_rest = left > LEFT_OVER && unexplained_fraction > LEFT_SHARE;
+    let has_rest = left > LEFT_OVER && unexplained_fraction > SOUGHT;
     let unexplained = if is_unexplained || has_rest {
         super::residual_tests::describe(plant, &search.split, &search.estimator.used, &best.residuals)
     } else {

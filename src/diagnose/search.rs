@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::dataset::Role;
-use super::fit::{BLOCK, Convergence, Estimator, Fit, Residuals, coordinates, sum_of_squares};
+use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, sum_of_squares};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
 
@@ -146,7 +146,12 @@ pub struct Screened {
     pub(super) rest: DVector<f64>,
     /// The model's tangents, orthonormal.
     pub(super) tangents: Vec<DVector<f64>>,
+    /// The derivatives by the model's coordinates, of all runs.
+    derivatives: Derivatives,
 }
+
+/// A start with its change of the residuals of all runs.
+type Change = (Term, DVector<f64>);
 
 impl Search<'_> {
     /// The candidate's name.
@@ -188,7 +193,7 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn fitted(&self, model: &Model) -> Result<Scored, DiagnoseError> {
-        self.fit_with_spread(model, Convergence::Full)
+        self.with_spread(self.estimator.fit(model, &self.split.fit, Convergence::Full)?, Convergence::Full)
     }
 
     /// Fits a model with its spread of the bench's faults as it is, and scores it.
@@ -199,9 +204,9 @@ impl Search<'_> {
         self.score(self.estimator.fit(model, &self.split.fit, Convergence::Full)?)
     }
 
-    /// Fits a model and the spread of the bench's faults in turn, and scores it.
-    fn fit_with_spread(&self, model: &Model, convergence: Convergence) -> Result<Scored, DiagnoseError> {
-        let mut best = self.score(self.estimator.fit(model, &self.split.fit, convergence)?)?;
+    /// Fits the spread of the bench's faults and a model in turn, from a first fit of the model, and scores it.
+    fn with_spread(&self, first: Fit, convergence: Convergence) -> Result<Scored, DiagnoseError> {
+        let mut best = self.score(first)?;
         for _ in 0..MOST_SPREADS {
             let spread = self.estimator.spread(best.model(), &self.split.all())?;
             if spread == best.model().spread {
@@ -215,7 +220,16 @@ impl Search<'_> {
 
     /// Fits a model to the convergence of [`Convergence::Rank`] and scores it.
     fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
-        self.fit_with_spread(model, Convergence::Rank)
+        self.with_spread(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?, Convergence::Rank)
+    }
+
+    /// [`ranked`](Self::ranked) for a model with terms beyond those that were screened.
+    fn ranked_beyond(&self, model: &Model, screened: &Screened) -> Result<Scored, DiagnoseError> {
+        let all = self.split.all();
+        let at: Vec<usize> = self.split.fit.iter().filter_map(|run| all.binary_search(run).ok()).collect();
+        let of_fit_runs = |column: &Vec<Residuals>| at.iter().map(|run| column[*run].clone()).collect();
+        let known: Derivatives = screened.derivatives.iter().map(of_fit_runs).collect();
+        self.with_spread(self.estimator.fit_beyond(model, &self.split.fit, &known)?, Convergence::Rank)
     }
 
     /// Alternates fits of nuisance parameters and model until χ² has converged.
@@ -347,30 +361,39 @@ impl Search<'_> {
     }
 
     /// [`screen`](Self::screen) of those candidates that are wanted.
-    fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
+        let used: Vec<&str> = from.model().terms.iter().map(|term| self.id(term.candidate)).collect();
+        self.ranking(from, self.changes(from, |candidate| is_wanted(candidate) && !used.contains(&candidate.id)))
+    }
+
+    /// The change of the residuals of all runs by every start of the wanted candidates; none for those that cannot be simulated.
+    fn changes(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Vec<Change> {
+        let runs = self.split.all();
+        let plain = joined(from, &runs);
+        let candidates = self.estimator.plant.candidates().iter().enumerate().filter(|(_, c)| is_wanted(c));
+        let starts: Vec<Term> =
+            candidates.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
+        let change = |term: Term| {
+            let residuals = self.estimator.residuals_of(&with(from.model(), [term.clone()]), &runs).ok()?;
+            Some((term, DVector::from_vec(residuals.concat()) - &plain))
+        };
+        starts.into_par_iter().filter_map(change).collect()
+    }
+
+    /// Starts by the linear estimate of how far they would lower χ².
+    fn ranking(&self, from: &Scored, changes: Vec<Change>) -> Result<Screened, DiagnoseError> {
         let runs = self.split.all();
         let base = from.model();
-        let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
         let candidates = self.estimator.plant.candidates();
-        let mut starts = Vec::new();
-        for (candidate, c) in candidates.iter().enumerate().filter(|(_, c)| is_wanted(c) && !used.contains(&c.id)) {
-            starts.extend(c.starts.iter().map(|x| Term { candidate, x: x.clone() }));
-        }
-        let plain = DVector::from_vec(runs.iter().flat_map(|run| from.residuals[*run].clone()).collect());
-        let own = self.tangents(base, &runs, &plain)?;
-        let columns: Vec<Option<DVector<f64>>> = starts
-            .par_iter()
-            .map(|term| {
-                let model = with(base, [term.clone()]);
-                let residuals = self.estimator.residuals_of(&model, &runs).ok()?;
-                let column = without_directions(&own, &(DVector::from_vec(residuals.concat()) - &plain));
-                (column.norm_squared() > 1e-12).then_some(column)
-            })
-            .collect();
-        let rest = without_directions(&own, &plain);
+        let derivatives = self.estimator.derivatives(base, &runs)?;
+        let own = tangents(&derivatives);
+        let rest = without_directions(&own, &joined(from, &runs));
+        let columns = changes.into_iter().map(|(term, change)| (term, without_directions(&own, &change)));
+        let columns: Vec<Change> = columns.filter(|(_, column)| column.norm_squared() > 1e-12).collect();
         let mut ranked = Vec::new();
-        let columns: Vec<(Term, DVector<f64>)> =
-            starts.into_iter().zip(columns).filter_map(|(term, column)| Some((term, column?))).collect();
         for (candidate, _) in candidates.iter().enumerate().filter(|(_, c)| c.is_free_form) {
             let own: Vec<_> = columns.iter().filter(|(term, _)| term.candidate == candidate).collect();
             ranked.extend(self.free_start(&own, &rest).map(|(gain, term)| (gain, with(base, [term]))));
@@ -382,7 +405,7 @@ impl Search<'_> {
             ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(Screened { ranked, columns, rest, tangents: own })
+        Ok(Screened { ranked, columns, rest, tangents: own, derivatives })
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -460,28 +483,6 @@ impl Search<'_> {
         (Term { candidate: start.candidate, x: start.x.iter().zip(parameters).map(moved).collect() }, true)
     }
 
-    /// Orthonormal basis of the residuals' derivatives by the model's coordinates.
-    fn tangents(&self, model: &Model, runs: &[usize], plain: &DVector<f64>) -> Result<Vec<DVector<f64>>, DiagnoseError> {
-        let columns: Vec<DVector<f64>> = coordinates(model)
-            .par_iter()
-            .map(|coordinate| {
-                let mut shifted = model.clone();
-                shifted.terms[coordinate.0].x[coordinate.1] += self.estimator.step(model, *coordinate);
-                Ok(DVector::from_vec(self.estimator.residuals_of(&shifted, runs)?.concat()) - plain)
-            })
-            .collect::<Result<_, DiagnoseError>>()?;
-        let mut orthogonal: Vec<DVector<f64>> = Vec::new();
-        for column in columns {
-            let size = column.norm();
-            let rest = without_directions(&orthogonal, &column);
-            let left = rest.norm();
-            if left > 1e-6 * size && left > 0.0 {
-                orthogonal.push(rest / left);
-            }
-        }
-        Ok(orthogonal)
-    }
-
     /// The best screened starts of `count` different candidates.
     pub(super) fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
         let mut chosen: Vec<Model> = Vec::new();
@@ -514,7 +515,7 @@ impl Search<'_> {
             let Some(term) = model.terms.last() else { continue };
             (self.progress)(&format!("fitting {}", self.id(term.candidate)));
             // A candidate that cannot be fitted is dropped.
-            if let Ok(scored) = self.ranked(&model) {
+            if let Ok(scored) = self.ranked_beyond(&model, &screened) {
                 trials.push(Trial { candidate: term.candidate, scored });
             }
         }
@@ -660,7 +661,7 @@ impl Search<'_> {
         if let [.., first, second] = &pair.terms[..] {
             (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
         }
-        let both = self.ranked(&pair).ok().filter(|both| self.is_worth(both, base))?;
+        let both = self.ranked_beyond(&pair, screened).ok().filter(|both| self.is_worth(both, base))?;
         self.fitted(both.model()).ok()
     }
 
@@ -755,22 +756,27 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
+        // What others change is taken with the cause in place, so that it is simulated once.
+        let used: Vec<&str> = best.model().terms.iter().map(|term| self.id(term.candidate)).collect();
+        let changes = self.changes(best, |candidate| !candidate.is_free_form && !used.contains(&candidate.id));
         let mut found = Vec::new();
-        for index in 0..best.model().terms.len() {
+        for (index, removed) in best.model().terms.iter().enumerate() {
             let mut model = best.model().clone();
-            let removed = model.terms.remove(index);
+            model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
             let Ok(without) = self.fitted_at_its_spread(&model) else { continue };
-            let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?.ranked;
+            let own_id = self.id(removed.candidate);
+            let mut changes = changes.clone();
+            changes.extend(self.changes(&without, |candidate| !candidate.is_free_form && candidate.id == own_id));
+            let screened = self.ranking(&without, changes)?;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();
             let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m);
-            let others = screened.iter().filter(is_promising);
-            for model in self.finalists(others, most) {
+            for model in self.finalists(screened.ranked.iter().filter(is_promising), most) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
-                if let Ok(scored) = self.ranked(&model) {
+                if let Ok(scored) = self.ranked_beyond(&model, &screened) {
                     found.push((index, Trial { candidate, scored }));
                 }
             }
@@ -810,6 +816,24 @@ fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
     let mut model = base.clone();
     model.terms.extend(terms);
     model
+}
+
+/// The residuals of runs, one after the other.
+pub(super) fn joined(scored: &Scored, runs: &[usize]) -> DVector<f64> {
+    DVector::from_vec(runs.iter().flat_map(|run| scored.residuals[*run].iter().copied()).collect())
+}
+
+/// Orthonormal basis of derivatives.
+fn tangents(derivatives: &Derivatives) -> Vec<DVector<f64>> {
+    let mut orthonormal: Vec<DVector<f64>> = Vec::new();
+    for column in derivatives.iter().map(|column| DVector::from_vec(column.concat())) {
+        let rest = without_directions(&orthonormal, &column);
+        let left = rest.norm();
+        if left > 1e-6 * column.norm() && left > 0.0 {
+            orthonormal.push(rest / left);
+        }
+    }
+    orthonormal
 }
 
 /// The part of a vector that is orthogonal to orthonormal ones.

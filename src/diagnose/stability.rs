@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::DiagnoseError;
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_GAIN, Scored, Screened, Search, without_directions};
+use super::search::{LEAST_GAIN, Scored, Screened, Search, joined, without_directions};
 
 /// Fewest runs that are resampled.
 const LEAST_RUNS: usize = 4;
@@ -25,7 +25,9 @@ pub(super) struct Standing {
 /// # Errors
 /// [`DiagnoseError`] if the model cannot be simulated.
 pub(super) fn standing(search: &Search, best: &Scored, without: &Scored, index: usize) -> Result<Standing, DiagnoseError> {
-    let screened = search.screen(without)?;
+    // Free forms count in the stead of constants only.
+    let is_constant = search.candidate(&best.model().terms[index]).is_constant;
+    let screened = search.screen_of(without, |candidate| if candidate.is_free_form { is_constant } else { !candidate.is_variant })?;
     Ok(Standing {
         stability: stability(search, best, without, index, &screened),
         is_left_by_law: is_left_by_law(search, best, without, index, &screened),
@@ -61,9 +63,7 @@ fn stability(search: &Search, best: &Scored, without: &Scored, index: usize, scr
             && !(other.is_free_form || other.is_variant)
             && !(own.is_free_form && other.places.iter().any(|place| own.places.contains(place)))
     };
-    let joined =
-        |scored: &Scored| DVector::from_vec(runs.iter().flat_map(|run| scored.residuals[*run].clone()).collect::<Vec<f64>>());
-    let column = without_directions(&screened.tangents, &(joined(best) - joined(without)));
+    let column = without_directions(&screened.tangents, &(joined(best, &runs) - joined(without, &runs)));
     let lengths: Vec<usize> = runs.iter().map(|run| without.residuals[*run].len()).collect();
     let own_parts = parts(&column, &screened.rest, &lengths);
     let rivals: Vec<Vec<[f64; 2]>> = screened
