@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use sfers::diagnose::diagnosis::{Adopted, Part};
+use sfers::diagnose::diagnosis::{Adopted, Part, Verdict};
 use sfers::diagnose::pipeline::Outcome;
 
 #[allow(dead_code)] // its main
@@ -42,6 +42,8 @@ fn friction_of_a_positioning_system_is_named_with_its_dependence_on_direction() 
     let Some(folder) = data("emps", "EMPS") else { return };
     let found = emps::diagnosed(&folder).unwrap();
     let coulomb = cause(&found.outcome, "coulomb-friction").parameters[0].value;
+    let diagnosis = &found.outcome.diagnosis;
+    assert!(diagnosis.verdict == Verdict::Named && !diagnosis.complete, "{}", diagnosis.summary);
     // 20.4 N were published; with friction of Stribeck's kind beside it 21.9 N come out.
     assert!((19.0..24.0).contains(&coulomb), "{coulomb} N");
     let by_direction = cause(&found.outcome, "viscous-friction-by-direction").parameters[0].value;

@@ -27,7 +27,8 @@ pub(super) struct Standing {
 pub(super) fn standing(search: &Search, best: &Scored, without: &Scored, index: usize) -> Result<Standing, DiagnoseError> {
     // Free forms count in the stead of constants only.
     let is_constant = search.candidate(&best.model().terms[index]).is_constant;
-    let screened = search.screen_of(without, |candidate| if candidate.is_free_form { is_constant } else { !candidate.is_variant })?;
+    let screened =
+        search.screen_of(without, |candidate| if candidate.is_free_form { is_constant } else { !candidate.is_variant })?;
     Ok(Standing {
         stability: stability(search, best, without, index, &screened),
         is_left_by_law: is_left_by_law(search, best, without, index, &screened),

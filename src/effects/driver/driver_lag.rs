@@ -52,11 +52,7 @@ pub const DRIVER_LAG: Effect = Effect {
     fitting: Fitting::Candidate {
         on: fits::any,
         variants: &[
-            Form {
-                fitted: &[("time_constant_s", 0.002), ("inertia", 0.2)],
-                starts: &[&[0.001, 0.3], &[0.005, 0.3]],
-                given: &[],
-            },
+            Form { fitted: &[("time_constant_s", 0.002), ("inertia", 0.2)], starts: &[&[0.001, 0.3], &[0.005, 0.3]], given: &[] },
             Form {
                 fitted: &[("time_constant_s", 0.002), ("rising", 0.3)],
                 starts: &[&[0.001, 2.0], &[0.001, 0.5], &[0.005, 2.0], &[0.005, 0.5]],
