@@ -113,6 +113,11 @@ fn a_clamp_that_gives_adds_its_turn_to_the_sag() {
     let moment = 4.804359999999999 * 980.0 * 5.0;
     let expected = -0.5e-7 * moment * 10.0;
     assert!(((soft - stiff) / expected - 1.0).abs() < 1e-3, "{stiff} {soft} {expected}");
+    // One that hardens at a turn of 1/a takes twice the moment there: c M = 2/a.
+    let hardening = 2.0 / (0.5e-7 * moment);
+    let values = [("compliance_rad_per_n_m", 0.5), ("hardening_per_rad", hardening)];
+    let hard = tip(&run(&with(CANTILEVER, "clamp-compliance", &values), &rest));
+    assert!(((hard - stiff) / (0.5 * expected) - 1.0).abs() < 1e-3, "{stiff} {hard} {expected}");
 }
 
 #[test]

@@ -54,12 +54,13 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 16] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 17] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 1e-3)]),
+    ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("hardening_per_rad", 300.0)]),
     ("air-drag", &[("drag_coefficient", 40.0)]),
     ("free-joint-memory", &[("share_3", 0.05), ("share_4", 0.1)]),
     ("free-moment-of-deviation", &[("low_per_m", -4.0), ("high_per_m", 4.0), ("above_2_mn_m", 1.0), ("below_3_mn_m", -0.5)]),
@@ -98,7 +99,7 @@ fn a_cantilever_moves_as_on_the_planar_engine() {
 
 #[test]
 fn a_cantilever_rests_as_on_the_planar_engine() {
-    for (id, values) in &ON_A_CANTILEVER[..5] {
+    for (id, values) in &ON_A_CANTILEVER[..6] {
         let robot = cantilever(0.03, id, values);
         let mut bullet = BulletEngine::new(&robot, 1e-5).unwrap();
         step(&mut bullet, &[-600.0], 150_000);
@@ -312,4 +313,6 @@ fn a_clamp_that_gives_goes_on_from_a_saved_state_with_the_same_bits() {
     // A state of a clamp that gives more is of another world.
     let softer = cantilever(0.008, "clamp-compliance", &[("compliance_rad_per_n_m", 3.0)]);
     assert!(BulletEngine::new(&softer, 1e-5).unwrap().load(1000, &state).is_err());
+    let harder = cantilever(0.008, "clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("hardening_per_rad", 300.0)]);
+    assert!(BulletEngine::new(&harder, 1e-5).unwrap().load(1000, &state).is_err());
 }

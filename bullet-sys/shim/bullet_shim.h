@@ -107,11 +107,12 @@ int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, d
 int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impulse, char *error, int32_t error_length);
 
 /* The same with a tie that gives: the base may turn about its y axis, at `pivot` (3 values, cm, in the base's frame), by `compliance`
- * (rad/(dyn cm)) times the moment on it, with a damper of `damping_time` (s) times the spring's stiffness. Both are implicit, so that no
- * compliance is too small for a step.
+ * (rad/(dyn cm)) times the moment on it, with a damper of `damping_time` (s) times the spring's stiffness, and harder the more it turns:
+ * the moment of a turn phi is phi (1 + (`hardening` phi)^2) / `compliance`, `hardening` in 1/rad. Both are implicit, so that no compliance
+ * is too small for a step.
  * body: a chain, each link hanging on the one before it. */
-int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double max_impulse,
-                                 char *error, int32_t error_length);
+int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double hardening,
+                                 double max_impulse, char *error, int32_t error_length);
 
 /* Reads all joints at once. angles (rad), rates (rad/s): `length` values each, one per link. */
 int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length);

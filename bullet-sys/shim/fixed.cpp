@@ -13,11 +13,12 @@ FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world)
                                  btMatrix3x3::getIdentity(), world.getBasis()) {}
 
 FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance,
-                                 btScalar damping_time)
+                                 btScalar damping_time, btScalar hardening)
     : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), pivot, world(pivot), btMatrix3x3::getIdentity(),
                                  world.getBasis()),
       compliance_(compliance),
-      damping_time_(damping_time) {}
+      damping_time_(damping_time),
+      hardening_(hardening) {}
 
 void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
                                            const btContactSolverInfo &info) {
@@ -81,11 +82,13 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
     out.m_rhs = position * out.m_jacDiagABInv + velocity * out.m_jacDiagABInv;
     out.m_cfm = 0;
     if (compliance_ > 0 && i == TURN_ABOUT_Y) {
-      const btScalar whole = info.m_timeStep + damping_time_;
+      // Of the moment and of its slope over the linear ones, at the present turn.
+      const btScalar moment = 1 + hardening_ * hardening_ * error * error, slope = 3 * moment - 2;
+      const btScalar whole = slope * info.m_timeStep + damping_time_;
       const btScalar softness = compliance_ / (info.m_timeStep * whole);
       out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
       out.m_cfm = softness * out.m_jacDiagABInv;
-      out.m_rhs = (velocity - error / whole) * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - error * moment / whole) * out.m_jacDiagABInv;
     }
     out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;

@@ -18,16 +18,18 @@ class FixedConstraint : public btMultiBodyFixedConstraint {
  public:
   FixedConstraint(btMultiBody *body, const btTransform &world);
   FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance,
-                  btScalar damping_time);
+                  btScalar damping_time, btScalar hardening);
   const btVector3 &pivot() const { return m_pivotInA; }
   btScalar compliance() const { return compliance_; }
   btScalar damping_time() const { return damping_time_; }
+  btScalar hardening() const { return hardening_; }
   void createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data, const btContactSolverInfo &info) override;
 
  private:
   Chain chain_;
   btScalar compliance_ = 0;    // of the turn about y (rad/(dyn cm))
   btScalar damping_time_ = 0;  // its damping over its stiffness (s)
+  btScalar hardening_ = 0;     // a of its moment phi (1 + (a phi)^2) / compliance (1/rad)
 };
 
 }  // namespace bs

@@ -215,19 +215,20 @@ int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impuls
   });
 }
 
-int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double max_impulse,
-                                 char *error, int32_t error_length) {
+int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double hardening,
+                                 double max_impulse, char *error, int32_t error_length) {
   return bs::guarded(error, error_length, [&] {
     require(world != nullptr && pivot != nullptr, "null pointer");
     require(max_impulse > 0, "the largest impulse must be positive");
     require(compliance > 0 && std::isfinite(compliance), "a compliance must be positive and finite");
     require(damping_time >= 0 && std::isfinite(damping_time), "a damping time must not be negative, and finite");
+    require(hardening >= 0 && std::isfinite(hardening), "a hardening must not be negative, and finite");
     require(is_finite(pivot), "a pivot must be finite");
     btMultiBody &multibody = world->multibody(body);
     require(is_chain(multibody), "a tie that gives needs a chain");
     auto constraint =
         std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform(), bs::vector(pivot), compliance,
-                                              damping_time);
+                                              damping_time, hardening);
     constraint->setMaxAppliedImpulse(max_impulse);
     world->constraints.push_back(std::move(constraint));
     world->dynamics.addMultiBodyConstraint(world->constraints.back().get());

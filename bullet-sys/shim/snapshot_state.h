@@ -161,6 +161,7 @@ inline double fingerprint(const bs_world &world) {
   for (const auto &constraint : world.constraints) {
     mix(constraint->getMaxAppliedImpulse()), mix(constraint->compliance()), mix3(constraint->pivot());
     if (constraint->damping_time() != 0) mix(constraint->damping_time());
+    if (constraint->hardening() != 0) mix(constraint->hardening());
   }
   return static_cast<double>(hash >> 12);
 }

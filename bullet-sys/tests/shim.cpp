@@ -240,15 +240,17 @@ void misuse() {
   CHECK(bs_fixed_constraint_add(w, 4, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_fixed_constraint_add(w, 1, 0, nullptr, 0) == BS_ERROR_ARGUMENT);
   auto sprung = [](bs_world *in, int32_t index, const double *pivot, double compliance, double impulse) {
-    return bs_sprung_constraint_add(in, index, pivot, compliance, 0, impulse, nullptr, 0);
+    return bs_sprung_constraint_add(in, index, pivot, compliance, 0, 0, impulse, nullptr, 0);
   };
   const double spoiled_pivot[3] = {0, NOT_A_NUMBER, 0};
   CHECK(sprung(nullptr, 3, at, 1e-6, 1) == BS_ERROR_ARGUMENT && sprung(w, 3, nullptr, 1e-6, 1) == BS_ERROR_ARGUMENT);
   CHECK(sprung(w, 4, at, 1e-6, 1) == BS_ERROR_ARGUMENT && sprung(w, 3, at, 1e-6, 0) == BS_ERROR_ARGUMENT);
   CHECK(sprung(w, 3, at, 0, 1) == BS_ERROR_ARGUMENT && sprung(w, 3, at, NOT_A_NUMBER, 1) == BS_ERROR_ARGUMENT);
   CHECK(sprung(w, 3, spoiled_pivot, 1e-6, 1) == BS_ERROR_ARGUMENT);
-  CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, -1, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
-  CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, NOT_A_NUMBER, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, -1, 0, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, NOT_A_NUMBER, 0, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, 0, -1, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, 0, NOT_A_NUMBER, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(sprung(w, world.crate, at, 1e-6, 1) == BS_ERROR_ARGUMENT);  // a body without links
   for (double step : {0.0, -STEP, NOT_A_NUMBER}) CHECK(bs_world_step(w, step, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_world_step(nullptr, STEP, nullptr, 0) == BS_ERROR_ARGUMENT);
@@ -411,7 +413,7 @@ void beyond_plain_boxes() {
   World hanging(settings());
   const double pivot[3] = {-1, 0, 0};
   CHECK(bs_multibody_add(hanging.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
-  CHECK(bs_sprung_constraint_add(hanging.handle, body, pivot, 1e-7, 0, 1e6, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(hanging.handle, body, pivot, 1e-7, 0, 0, 1e6, nullptr, 0) == BS_OK);
   double angle = 0, rate = 0, torque = 0;
   for (int step = 0; step < 4000; ++step) {
     CHECK(bs_joint_states(hanging.handle, body, &angle, &rate, 1) == BS_OK);
@@ -426,12 +428,16 @@ void beyond_plain_boxes() {
   const Numbers hung = take(hanging);
   World stiffer(settings());
   CHECK(bs_multibody_add(stiffer.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
-  CHECK(bs_sprung_constraint_add(stiffer.handle, body, pivot, 2e-7, 0, 1e6, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(stiffer.handle, body, pivot, 2e-7, 0, 0, 1e6, nullptr, 0) == BS_OK);
   CHECK(restore(stiffer, hung) == BS_ERROR_SNAPSHOT);
   World damped(settings());
   CHECK(bs_multibody_add(damped.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
-  CHECK(bs_sprung_constraint_add(damped.handle, body, pivot, 1e-7, 1e-3, 1e6, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(damped.handle, body, pivot, 1e-7, 1e-3, 0, 1e6, nullptr, 0) == BS_OK);
   CHECK(restore(damped, hung) == BS_ERROR_SNAPSHOT);
+  World harder(settings());
+  CHECK(bs_multibody_add(harder.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(harder.handle, body, pivot, 1e-7, 0, 100, 1e6, nullptr, 0) == BS_OK);
+  CHECK(restore(harder, hung) == BS_ERROR_SNAPSHOT);
 }
 
 // A driven world in mid-jump, with some contacts left.

@@ -151,11 +151,11 @@ impl World {
     }
 
     /// The same with a tie that gives: the base may turn about its y axis, at `pivot` (cm, in its frame), by `compliance` (rad/(dyn·cm))
-    /// times the moment on it, with a damper of `damping_time` (s) times the spring's stiffness. Both are implicit, so that no compliance is too
-    /// small for a step.
+    /// times the moment on it, with a damper of `damping_time` (s) times the spring's stiffness, and harder the more it turns: the moment of a turn φ
+    /// is φ (1 + (`hardening` φ)²)/`compliance`, `hardening` in 1/rad. Both are implicit, so that no compliance is too small for a step.
     ///
     /// # Errors
-    /// [`BulletError::ForeignBody`], [`BulletError::Value`] for a compliance or an impulse that is not positive or a negative damping time, or
+    /// [`BulletError::ForeignBody`], [`BulletError::Value`] for a compliance or an impulse that is not positive or a negative damping time or hardening, or
     /// [`BulletError::Refused`] for a body that is no chain of links.
     pub fn add_sprung_constraint(
         &mut self,
@@ -163,12 +163,14 @@ impl World {
         pivot: [f64; 3],
         compliance: f64,
         damping_time: f64,
+        hardening: f64,
         max_impulse: f64,
     ) -> Result<(), BulletError> {
         self.links_of(body)?;
         finite("a pivot (cm)", &pivot)?;
         positive("a compliance (rad/(dyn·cm))", &[compliance])?;
         not_negative("a damping time (s)", damping_time)?;
+        not_negative("a hardening (1/rad)", hardening)?;
         positive("the largest impulse (dyn·s)", &[max_impulse])?;
         let mut message = Message::new();
         // SAFETY: the body's index is valid in this world (links_of); pivot has the 3 values asked for; the message's length is its own.
@@ -179,6 +181,7 @@ impl World {
                 pivot.as_ptr(),
                 compliance,
                 damping_time,
+                hardening,
                 max_impulse,
                 message.0.as_mut_ptr(),
                 256,

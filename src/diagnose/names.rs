@@ -57,7 +57,11 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
             fitted.nth(1).map_or("", |_| "with an exponent").into()
         }
         "dry-friction" => fitted.nth(1).map_or("", |_| "with presliding").into(),
-        "clamp-compliance" => fitted.nth(1).map_or("", |_| "with a damper").into(),
+        "clamp-compliance" => match fitted.nth(1) {
+            Some("hardening_per_rad") => "that hardens".into(),
+            Some(_) => "with a damper".into(),
+            None => String::new(),
+        },
         "weak-actuator" => given("actuator").map_or_else(String::new, |number| format!("number {number}")),
         _ => String::new(),
     }

@@ -483,9 +483,10 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
             .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
             .map(|(_, trial)| trial.scored.clone());
         let Some(better) = better else { break };
-        // A cause in a constant's place lets the constant stay free beside it.
-        best = search.settle(search.fitted(&search.with_constants(better.model()))?)?;
+        best = search.settle(better)?;
         best = search.backward(best)?;
+        // A cause in a constant's place lets the constant stay free beside it.
+        best = search.with_significant_constants(best)?;
     }
     let faults_come_last = search.estimator.held_spread.take().is_some();
     if search.measure_noise(&best)? || faults_come_last {

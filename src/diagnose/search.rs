@@ -150,9 +150,6 @@ pub struct Screened {
     derivatives: Derivatives,
 }
 
-/// A start with its change of the residuals of all runs.
-type Change = (Term, DVector<f64>);
-
 impl Search<'_> {
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
@@ -341,6 +338,29 @@ impl Search<'_> {
         all
     }
 
+    /// The model with those of the missing constants that are significant beside its causes.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated with all constants.
+    pub fn with_significant_constants(&self, from: Scored) -> Result<Scored, DiagnoseError> {
+        let own = from.model().terms.len();
+        let mut all = self.fitted(&self.with_constants(from.model()))?;
+        while all.model().terms.len() > own {
+            let without = |index: usize| {
+                let mut model = all.model().clone();
+                model.terms.remove(index);
+                self.ranked(&model).ok()
+            };
+            let shorter = (own..all.model().terms.len()).filter_map(without);
+            let Some(least) = shorter.min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(from) };
+            if self.is_significant(&all, &least) {
+                return Ok(all);
+            }
+            all = self.fitted(least.model())?;
+        }
+        Ok(from)
+    }
+
     /// The nominal model with its constants fitted.
     ///
     /// # Errors
@@ -365,34 +385,23 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub(super) fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
-        let used: Vec<&str> = from.model().terms.iter().map(|term| self.id(term.candidate)).collect();
-        self.ranking(from, self.changes(from, |candidate| is_wanted(candidate) && !used.contains(&candidate.id)))
-    }
-
-    /// The change of the residuals of all runs by every start of the wanted candidates; none for those that cannot be simulated.
-    fn changes(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Vec<Change> {
-        let runs = self.split.all();
-        let plain = joined(from, &runs);
-        let candidates = self.estimator.plant.candidates().iter().enumerate().filter(|(_, c)| is_wanted(c));
-        let starts: Vec<Term> =
-            candidates.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
-        let change = |term: Term| {
-            let residuals = self.estimator.residuals_of(&with(from.model(), [term.clone()]), &runs).ok()?;
-            Some((term, DVector::from_vec(residuals.concat()) - &plain))
-        };
-        starts.into_par_iter().filter_map(change).collect()
-    }
-
-    /// Starts by the linear estimate of how far they would lower χ².
-    fn ranking(&self, from: &Scored, changes: Vec<Change>) -> Result<Screened, DiagnoseError> {
         let runs = self.split.all();
         let base = from.model();
+        let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
         let candidates = self.estimator.plant.candidates();
+        let wanted = candidates.iter().enumerate().filter(|(_, c)| is_wanted(c) && !used.contains(&c.id));
+        let starts: Vec<Term> =
+            wanted.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
+        let plain = joined(from, &runs);
         let derivatives = self.estimator.derivatives(base, &runs)?;
         let own = tangents(&derivatives);
-        let rest = without_directions(&own, &joined(from, &runs));
-        let columns = changes.into_iter().map(|(term, change)| (term, without_directions(&own, &change)));
-        let columns: Vec<Change> = columns.filter(|(_, column)| column.norm_squared() > 1e-12).collect();
+        let rest = without_directions(&own, &plain);
+        let column = |term: Term| {
+            let residuals = self.estimator.residuals_of(&with(base, [term.clone()]), &runs).ok()?;
+            let column = without_directions(&own, &(DVector::from_vec(residuals.concat()) - &plain));
+            (column.norm_squared() > 1e-12).then_some((term, column))
+        };
+        let columns: Vec<(Term, DVector<f64>)> = starts.into_par_iter().filter_map(column).collect();
         let mut ranked = Vec::new();
         for (candidate, _) in candidates.iter().enumerate().filter(|(_, c)| c.is_free_form) {
             let own: Vec<_> = columns.iter().filter(|(term, _)| term.candidate == candidate).collect();
@@ -756,9 +765,6 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
-        // What others change is taken with the cause in place, so that it is simulated once.
-        let used: Vec<&str> = best.model().terms.iter().map(|term| self.id(term.candidate)).collect();
-        let changes = self.changes(best, |candidate| !candidate.is_free_form && !used.contains(&candidate.id));
         let mut found = Vec::new();
         for (index, removed) in best.model().terms.iter().enumerate() {
             let mut model = best.model().clone();
@@ -766,10 +772,7 @@ impl Search<'_> {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
             let Ok(without) = self.fitted_at_its_spread(&model) else { continue };
-            let own_id = self.id(removed.candidate);
-            let mut changes = changes.clone();
-            changes.extend(self.changes(&without, |candidate| !candidate.is_free_form && candidate.id == own_id));
-            let screened = self.ranking(&without, changes)?;
+            let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();
             let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m);

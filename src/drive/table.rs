@@ -87,9 +87,20 @@ impl Table {
         }
     }
 
+    /// Number of rows up to time `t` (s): at once for times at equal distances.
+    fn rows_until(&self, t: f64) -> usize {
+        let last = self.times.len() - 1;
+        let share = (t - self.times[0]) / (self.times[last] - self.times[0]);
+        let row = ((share * last as f64) as usize).min(last);
+        if self.times[row] <= t && self.times.get(row + 1).is_none_or(|next| t < *next) {
+            return row + 1;
+        }
+        self.times.partition_point(|&time| time <= t)
+    }
+
     /// The integral of an actuator's voltage from the first row to `t` (V·s).
     fn integral(&self, t: f64) -> impl Fn(usize) -> f64 + '_ {
-        let row = self.times.partition_point(|&time| time <= t).saturating_sub(1);
+        let row = self.rows_until(t).saturating_sub(1);
         let past = t - self.times[row];
         move |a| {
             let at = row * self.actuators + a;
@@ -105,7 +116,7 @@ impl Table {
 
     /// Writes the voltages (V) at time `t` (s) to `out`.
     pub fn at(&self, t: f64, out: &mut [f64]) {
-        let after = self.times.partition_point(|&time| time <= t);
+        let after = self.rows_until(t);
         if after == 0 {
             out.copy_from_slice(self.row(0));
         } else if after == self.times.len() {

@@ -98,6 +98,7 @@ impl BulletEngine {
                     left_end,
                     extensions.clamp_compliance,
                     extensions.clamp_damping,
+                    extensions.clamp_hardening,
                     CLAMP_IMPULSE,
                 )?;
             }

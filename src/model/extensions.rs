@@ -19,6 +19,8 @@ pub struct Extensions {
     pub clamp_compliance: f64,
     /// Damping of a compliant clamp over its stiffness (s).
     pub clamp_damping: f64,
+    /// a of the moment φ (1 + (a φ)²) over the compliance of a compliant clamp that turns by φ (1/rad).
+    pub clamp_hardening: f64,
     /// Masses fixed to the sheet.
     pub point_masses: Vec<PointMass>,
     /// Curvature at 0 V (1/cm), one per actuator, or none.
@@ -100,6 +102,7 @@ impl Default for Extensions {
             friction_scale: 1.0,
             clamp_compliance: 0.0,
             clamp_damping: 0.0,
+            clamp_hardening: 0.0,
             point_masses: Vec::new(),
             rest_curvature: Vec::new(),
             joint_gains: Vec::new(),

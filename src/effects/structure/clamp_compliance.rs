@@ -1,12 +1,13 @@
-//! The clamp gives, so the root turns in proportion to the moment on it.
+//! The clamp gives, so the root turns with the moment on it.
 //!
 //! ```text
-//! φ + T·φ̇ = c·M_root
+//! φ·(1 + (a·φ)²) + T·φ̇ = c·M_root
 //! ```
 //!
 //! # Parameters
 //! * `compliance_rad_per_n_m` (rad/(N·m)): turn c of the root per moment
 //! * `damping_s` (s): T: damping of the clamp over its stiffness
+//! * `hardening_per_rad` (1/rad): a: a turn of 1/a takes twice the moment of a clamp that does not harden, as where play ends or faces come to bear
 //!
 //! # Source
 //! J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived. Damping: Kelvin and Voigt’s element.
@@ -17,8 +18,8 @@ use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, fits
 pub const CLAMP_COMPLIANCE: Effect = Effect {
     id: "clamp-compliance",
     kind: Kind::Structure,
-    cause: "The clamp gives, so the root turns in proportion to the moment on it.",
-    equation: "φ + T·φ̇ = c·M_root",
+    cause: "The clamp gives, so the root turns with the moment on it.",
+    equation: "φ·(1 + (a·φ)²) + T·φ̇ = c·M_root",
     source: "J. Lee, J. Mech. Sci. Technol. 27 (2013) 297: lower frequencies with a clamp that gives; factors derived. Damping: Kelvin and Voigt’s element.",
     parameters: &[
         Parameter {
@@ -37,20 +38,36 @@ pub const CLAMP_COMPLIANCE: Effect = Effect {
             default: Some(0.0),
             about: "T: damping of the clamp over its stiffness",
         },
+        Parameter {
+            name: "hardening_per_rad",
+            unit: "1/rad",
+            bounds: [0.0, 1e5],
+            off: None,
+            default: Some(0.0),
+            about: "a: a turn of 1/a takes twice the moment of a clamp that does not harden, as where play ends or faces come to bear",
+        },
     ],
     places: &[Place::Clamp],
     fitting: Fitting::Candidate {
         on: fits::clamped,
-        variants: &[Form {
-            fitted: &[("compliance_rad_per_n_m", 0.5), ("damping_s", 2e-3)],
-            starts: &[&[0.2, 2e-3], &[1.0, 2e-3]],
-            given: &[],
-        }],
+        variants: &[
+            Form {
+                fitted: &[("compliance_rad_per_n_m", 0.5), ("damping_s", 2e-3)],
+                starts: &[&[0.2, 2e-3], &[1.0, 2e-3]],
+                given: &[],
+            },
+            Form {
+                fitted: &[("compliance_rad_per_n_m", 0.5), ("hardening_per_rad", 200.0)],
+                starts: &[&[0.5, 200.0], &[2.0, 200.0], &[2.0, 1000.0]],
+                given: &[],
+            },
+        ],
         forms: &[Form { fitted: &[("compliance_rad_per_n_m", 0.5)], starts: &[&[0.2], &[1.0]], given: &[] }],
     },
     shape: None,
     action: Action::Robot(|p, robot| {
         robot.extensions.clamp_compliance += 1e-7 * p[0];
         robot.extensions.clamp_damping = p[1];
+        robot.extensions.clamp_hardening = p[2];
     }),
 };

@@ -27,6 +27,10 @@ pub(super) struct JointExtensions {
     /// Length of sheet that a joint stands for (cm).
     link: f64,
     softening: f64,
+    /// Square of the clamp's hardening (1/rad²).
+    hardening: f64,
+    /// Mean rate of the root in the last step where the clamp hardens (rad/s).
+    root_rate: f64,
     /// Largest moment of friction and of the curve of the rate (dyn·cm).
     friction: f64,
     /// Per unit of the Prony chain: remainder after a step, gain per rate, and the means of both over the step.
@@ -53,7 +57,8 @@ pub(super) struct JointExtensions {
 impl JointExtensions {
     /// `None` for the plain model.
     pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Self> {
-        if !extensions.bends_torque_law() && !extensions.has_drag() {
+        let hardening = extensions.clamp_hardening.powi(2);
+        if !extensions.bends_torque_law() && !extensions.has_drag() && hardening == 0.0 {
             return None;
         }
         let count = quads.len();
@@ -64,6 +69,8 @@ impl JointExtensions {
         });
         Some(Self {
             softening: extensions.softening / (link * link),
+            hardening,
+            root_rate: 0.0,
             friction: extensions.dry_friction + extensions.moment_of_rate.largest(),
             prony: prony(step),
             half_step: 0.5 * step,
@@ -125,9 +132,25 @@ impl JointExtensions {
         (torque, slope)
     }
 
+    /// Torque of the clamp's hardening, and its slope, at the root's angle.
+    fn clamp(&self, root: &Quad, angle: f64) -> [f64; 2] {
+        let per_angle = -root.stiffness.lane(0) * self.hardening * angle * angle;
+        [per_angle * angle, 3.0 * per_angle]
+    }
+
+    /// Slope of a hardening clamp's moment against the root's angle (dyn·cm/rad); none for other quads and clamps.
+    pub(super) fn clamp_stiffness(&self, k: usize, quad: &Quad) -> Option<f64> {
+        let hardens = self.hardening != 0.0 && k == 0;
+        hardens.then(|| quad.stiffness.lane(0) - self.clamp(quad, quad.angle.lane(0))[1])
+    }
+
     /// Extra torques (dyn·cm) of joints at rest, for statics, in the sense of rotation from the root outwards.
     pub(super) fn at_rest(&self, k: usize, quad: &Quad, delta: Lanes) -> Lanes {
-        if self.is_elastic() { self.elastic(k, quad, delta).0 } else { Lanes::ZERO }
+        let mut torque = if self.is_elastic() { self.elastic(k, quad, delta).0 } else { Lanes::ZERO };
+        if self.hardening != 0.0 && k == 0 {
+            torque.set_lane(0, self.clamp(quad, delta.lane(0))[0]);
+        }
+        torque
     }
 
     /// Extra torques (dyn·cm) at elastic angle (rad) and rate (rad/s), for records, in the same sense.
@@ -195,6 +218,11 @@ impl JointExtensions {
                 torque += elastic - half * tangent * rate;
                 slope += -(half * tangent);
             }
+            if self.hardening != 0.0 && k == 0 {
+                let [clamp, tangent] = self.clamp(quad, quad.angle.lane(0) + self.half_step * self.root_rate);
+                torque.set_lane(0, clamp - self.half_step * tangent * self.root_rate);
+                slope.set_lane(0, -self.half_step * tangent);
+            }
             for (elastic, [per_angle, limit]) in self.slips_of(k) {
                 let middle = *elastic + half * rate;
                 let held = middle.map(|angle| if angle.abs() < limit { per_angle } else { 0.0 });
@@ -223,6 +251,9 @@ impl JointExtensions {
     pub(super) fn accept(&mut self, quads: &[Quad]) -> bool {
         let mut before = f64x2::ZERO;
         let mut changed = 0.0_f64;
+        if self.hardening != 0.0 {
+            self.root_rate = quads[0].mean[0].lane(0);
+        }
         for (k, quad) in quads.iter().enumerate() {
             let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
             before = quad.mean[0].level(1);
@@ -283,10 +314,14 @@ impl JointExtensions {
     /// Rates and memory as numbers for storing.
     pub(super) fn saved(&self) -> impl Iterator<Item = f64> + '_ {
         let memory = self.memory.iter().flatten();
-        self.rates.iter().chain(memory).chain(&self.slips).flat_map(|lanes| lanes.to_array())
+        let of_lanes = self.rates.iter().chain(memory).chain(&self.slips).flat_map(|lanes| lanes.to_array());
+        of_lanes.chain((self.hardening != 0.0).then_some(self.root_rate))
     }
 
     pub(super) fn restore(&mut self, saved: &[f64]) {
+        if self.hardening != 0.0 {
+            self.root_rate = saved.last().copied().unwrap_or(0.0);
+        }
         let slots = self.rates.iter_mut().chain(self.memory.iter_mut().flatten()).chain(&mut self.slips);
         for (slot, values) in slots.zip(saved.as_chunks().0) {
             *slot = Lanes::new(*values);

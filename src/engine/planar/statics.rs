@@ -82,6 +82,9 @@ impl PlanarEngine {
                 quad.load_torque(-1.0, inner);
                 if let Some(extensions) = &self.extensions {
                     quad.torque += extensions.at_rest(k, quad, quad.angle - inner.into() - quad.rest_angle);
+                    if let Some(stiffness) = extensions.clamp_stiffness(k, quad) {
+                        quad.implicit.set_lane(0, stiffness);
+                    }
                 }
                 before = last;
             }
