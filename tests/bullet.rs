@@ -70,10 +70,11 @@ fn wrong_lengths_steps_and_foreign_bodies_are_errors() {
     assert!(world.set_joint_states(body, &[f64::NAN], &[0.0]).is_err());
     assert_eq!(world.base_state(foreign), Err(BulletError::ForeignBody));
     assert!(world.add_fixed_constraint(body, 0.0).is_err());
-    assert!(world.add_sprung_constraint(body, [0.0; 3], 0.0, 0.0, 500.0).is_err());
-    assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, -1.0, 500.0).is_err());
-    assert!(world.add_sprung_constraint(body, [f64::NAN; 3], 1e-7, 0.0, 500.0).is_err());
-    assert!(matches!(other.add_sprung_constraint(foreign, [0.0; 3], 1e-7, 0.0, 500.0), Err(BulletError::Refused(_))));
+    assert!(world.add_sprung_constraint(body, [0.0; 3], 0.0, 0.0, 0.0, 500.0).is_err());
+    assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, -1.0, 0.0, 500.0).is_err());
+    assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, 0.0, -1.0, 500.0).is_err());
+    assert!(world.add_sprung_constraint(body, [f64::NAN; 3], 1e-7, 0.0, 0.0, 500.0).is_err());
+    assert!(matches!(other.add_sprung_constraint(foreign, [0.0; 3], 1e-7, 0.0, 0.0, 500.0), Err(BulletError::Refused(_))));
     assert_eq!(world.add_forces(body, &[Wrench::default()]), Err(BulletError::Length { what: "forces", found: 1, needed: 2 }));
     assert!(world.add_forces(body, &[Wrench { force: [f64::NAN; 3], torque: [0.0; 3] }; 2]).is_err());
     assert_eq!(world.set_frictions(body, &[1.0; 3]), Err(BulletError::Length { what: "frictions", found: 3, needed: 2 }));
