@@ -27,7 +27,7 @@ pub struct Extensions {
     pub rest_curvature: Vec<f64>,
     /// Factor on each joint's voltage (–), or none.
     pub joint_gains: Vec<f64>,
-    /// a of `k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p)` (cm²), with κ₀ = [`SOFTENING_CURVATURE`].
+    /// a of `k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p)` (cm²), with κ₀ = `SOFTENING_CURVATURE`.
     pub softening: f64,
     /// p of the same; 2 is the cubic law.
     pub softening_exponent: f64,
