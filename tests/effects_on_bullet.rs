@@ -315,4 +315,14 @@ fn a_clamp_that_gives_goes_on_from_a_saved_state_with_the_same_bits() {
     assert!(BulletEngine::new(&softer, 1e-5).unwrap().load(1000, &state).is_err());
     let harder = cantilever(0.008, "clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("hardening_per_rad", 300.0)]);
     assert!(BulletEngine::new(&harder, 1e-5).unwrap().load(1000, &state).is_err());
+    // The planar engine starts its next step from the root's last rate.
+    let new = || PlanarEngine::new(&harder, 1e-4).unwrap();
+    let mut engine = new();
+    step(&mut engine, &[-600.0], 200);
+    let state = engine.save().unwrap();
+    step(&mut engine, &[-600.0], 200);
+    let mut fresh = new();
+    fresh.load(200, &state).unwrap();
+    step(&mut fresh, &[-600.0], 200);
+    assert_eq!(fresh.save().unwrap(), engine.save().unwrap());
 }

@@ -25,10 +25,12 @@ const TOLERANCE: f64 = 1e-6;
 /// ... or by less than this share of χ² beyond the number of values: for full convergence, and to rank models.
 const RELATIVE_TOLERANCE: f64 = 1e-4;
 const RELATIVE_TOLERANCE_TO_RANK: f64 = 2e-2;
-/// Most iterations: for full convergence, and to rank models.
+/// Most evaluations of the derivatives by finite differences: for full convergence, and to rank models.
 const MOST_ITERATIONS: usize = 25;
 const MOST_ITERATIONS_TO_RANK: usize = 8;
-/// Most steps with derivatives that follow the residuals.
+/// A step is trusted, so that the derivatives follow it, if χ² falls by more than this share of what they promise, ...
+const LEAST_KEPT: f64 = 0.5;
+/// ... up to this number of steps.
 const MOST_STEPS: usize = 60;
 /// Values in a block over which residuals may be correlated.
 pub(super) const BLOCK: usize = 50;
@@ -354,8 +356,9 @@ impl<'a> Estimator<'a> {
 
     /// [`fit`](Self::fit) with one coordinate, term and parameter, held.
     ///
-    /// Between evaluations by finite differences the derivatives follow the residuals by Broyden's update (1965), as long as steps lower χ² by half
-    /// of what they promise; a full fit ends with derivatives by finite differences.
+    /// Between evaluations by finite differences the derivatives follow the residuals by Broyden's update (1965), as long as steps keep
+    /// [`LEAST_KEPT`] of what they promise. A full fit that converges ends with derivatives by finite differences; the information of one to rank by may
+    /// be that of derivatives that follow.
     fn fit_held(
         &self,
         start: &Model,
@@ -380,7 +383,7 @@ impl<'a> Estimator<'a> {
             let (is_done, is_trusted) = match &better {
                 Some(step) => {
                     let gain = here.chi2 - step.chi2;
-                    (gain < least(step.chi2), gain > 0.5 * step.promised && steps < MOST_STEPS)
+                    (gain < least(step.chi2), gain > LEAST_KEPT * step.promised && steps < MOST_STEPS)
                 }
                 None => (true, false),
             };

@@ -19,8 +19,8 @@ use super::summary::{Findings, failing, summary};
 const SEARCH_RESOLUTION: f64 = 10.0;
 /// Structure is left if χ² per value exceeds 1 by this (a misfit of σ/2), ...
 const LEFT_OVER: f64 = 0.25;
-/// ... and nothing is explained if it is by this share of what the refined nominal model leaves: a name stands with 95 % of what its place takes. For n
-/// causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
+/// ... and the verdict is unexplained if it is also by this share of what the refined nominal model leaves: a name stands with 95 % of what its place
+/// takes. For n causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
 const LEFT_SHARE: f64 = 0.05;
 /// Causes are minor that together remove no more than this share, ...
 const MINOR_SHARE: f64 = 0.02;

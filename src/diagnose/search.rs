@@ -3,7 +3,7 @@
 //! Models are fitted to the fit runs and judged on the held-out ones. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, selection and replacement share the state of one search; its last 110 lines are tests.
+//! The file is long because screening, selection and replacement share the state of one search; its last 120 lines are tests.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

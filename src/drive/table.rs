@@ -158,6 +158,19 @@ mod tests {
     }
 
     #[test]
+    fn a_row_is_found_at_once_or_by_search_alike() {
+        let even: Vec<f64> = (0..101).map(|k| 0.1 * f64::from(k)).collect();
+        let uneven: Vec<f64> = (0..101).map(|k| (0.07 * f64::from(k)).exp()).collect();
+        for times in [even, uneven, vec![2.0]] {
+            let table = Table::new(times.clone(), vec![0.0; times.len()], 1).unwrap();
+            let between = (-50..5000).map(|k| 0.25 * f64::from(k));
+            for t in times.iter().flat_map(|t| [t.next_down(), *t, t.next_up()]).chain(between) {
+                assert_eq!(table.rows_until(t), times.iter().filter(|time| **time <= t).count(), "{t}");
+            }
+        }
+    }
+
+    #[test]
     fn rows_out_of_order_or_not_finite_are_refused_by_number() {
         assert_eq!(Table::new(vec![0.0, 0.0], vec![1.0, 2.0], 1), Err(TableError::Row(1)));
         assert_eq!(Table::new(vec![0.0, f64::NAN], vec![1.0, 2.0], 1), Err(TableError::Row(1)));

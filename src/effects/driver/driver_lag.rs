@@ -209,13 +209,18 @@ mod tests {
         assert!((lag.state()[0] - risen).abs() < 1e-12);
         (0..25).for_each(|_| lag.pass(1e-3, &mut [0.0]));
         assert!((lag.state()[0] - risen * (-1.25_f64).exp()).abs() < 1e-12);
-        let settled = |rising: f64, to: f64| {
-            let mut second = SecondOrder { time: 0.02, inertia: 0.2, rising, state: vec![[0.0; 2]] };
-            (0..25).for_each(|_| second.pass(1e-3, &mut [to]));
-            second.state[0][0]
+        let after = |time: f64, rising: f64, from: [f64; 2], to: f64| {
+            let mut second = SecondOrder { time, inertia: 0.2, rising, state: vec![from] };
+            (0..10).for_each(|_| second.pass(1e-3, &mut [to]));
+            second.state[0]
         };
-        assert!((settled(0.5, 100.0) - settled(1.0, 100.0)).abs() > 1.0);
-        assert!((settled(0.5, -100.0) - settled(1.0, -100.0)).abs() < 1e-12);
+        let same = |a: [f64; 2], b: [f64; 2]| assert!((a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-9, "{a:?} {b:?}");
+        // Towards 100 V as with half the time constant, of which the state's rate is a multiple; then down to −100 V as with the whole one.
+        let risen = after(0.02, 0.5, [0.0; 2], 100.0);
+        let [voltage, rate] = after(0.01, 1.0, [0.0; 2], 100.0);
+        assert!(rate > 10.0, "{rate}");
+        same(risen, [voltage, 2.0 * rate]);
+        same(after(0.02, 0.5, risen, -100.0), after(0.02, 1.0, risen, -100.0));
     }
 
     #[test]
