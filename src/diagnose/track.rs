@@ -57,7 +57,9 @@ pub(super) fn track(
         }
         Ok(())
     };
+    // Markers at the beginning and at the end of a step, and the step at whose beginning the latter are.
     let (mut before, mut after): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
+    let mut sampled = None;
     let mut tracks = Vec::with_capacity(times.len() * markers.len());
     let (parts, mut part_volts) = (chain.parts(), vec![0.0; n]);
     let (mut step, mut next) = (0_u64, 0);
@@ -65,7 +67,11 @@ pub(super) fn track(
         let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
         let is_on_step = |t: f64| t <= from + ON_STEP * h;
         if times[next] < to - ON_STEP * h {
-            sample(&mut engine, &mut before)?;
+            if sampled == Some(step) {
+                std::mem::swap(&mut before, &mut after);
+            } else {
+                sample(&mut engine, &mut before)?;
+            }
             while next < times.len() && is_on_step(times[next]) {
                 tracks.extend(before.iter().map(|[x, z, ..]| [*x, *z]));
                 next += 1;
@@ -91,6 +97,7 @@ pub(super) fn track(
         step += 1;
         if times[next] < to - ON_STEP * h {
             sample(&mut engine, &mut after)?;
+            sampled = Some(step);
             while next < times.len() && times[next] < to - ON_STEP * h {
                 let t = times[next];
                 tracks.extend(before.iter().zip(&after).map(|([x0, z0, u0, w0], [x1, z1, u1, w1])| {

@@ -15,6 +15,8 @@ pub use table::{Table, TableError};
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
+use table::Reached;
+
 /// Share of a time that sums of a few times err by at most.
 const ROUNDING: f64 = 1e-12;
 
@@ -177,10 +179,17 @@ impl Drive {
     /// Writes the mean voltages (V) from `from` to `to` (s), between which none jumps: what changes smoothly is taken at the middle, and a
     /// table's lines are integrated.
     pub(crate) fn mean_without_jump(&self, from: f64, to: f64, out: &mut [f64]) {
+        match self.plain_table() {
+            Some(table) => table.mean(from - self.delay, to - self.delay, out),
+            None => self.voltages(0.5 * (from + to), out),
+        }
+    }
+
+    /// The table, if its lines are the voltages; then their mean is exact, also where a table jumps.
+    fn plain_table(&self) -> Option<&Table> {
         match &self.waveform {
-            // Exact, also where a table jumps.
-            Waveform::Table(table) if self.positive_gain == 1.0 => table.mean(from - self.delay, to - self.delay, out),
-            _ => self.voltages(0.5 * (from + to), out),
+            Waveform::Table(table) if self.positive_gain == 1.0 => Some(table),
+            _ => None,
         }
     }
 
@@ -202,6 +211,8 @@ pub struct Means<'a> {
     /// Voltages at the start of the coming stretch (V), and until when (s) they hold.
     start: Vec<f64>,
     until: f64,
+    /// How far a table's lines are integrated.
+    reached: Reached,
 }
 
 impl<'a> Means<'a> {
@@ -211,7 +222,7 @@ impl<'a> Means<'a> {
     }
 
     pub(crate) fn of(drive: Cow<'a, Drive>, actuators: usize, start: f64) -> Self {
-        let mut means = Self { drive, start: vec![0.0; actuators], until: start };
+        let mut means = Self { drive, start: vec![0.0; actuators], until: start, reached: Reached::default() };
         means.restart(start);
         means
     }
@@ -234,6 +245,9 @@ impl<'a> Means<'a> {
             return out.copy_from_slice(&self.start);
         }
         let drive = self.drive.as_ref();
+        if let Some(table) = drive.plain_table() {
+            return table.mean_onwards(from - drive.delay, to - drive.delay, &mut self.reached, out);
+        }
         if !drive.jumps() {
             return drive.mean_without_jump(from, to, out);
         }

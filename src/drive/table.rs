@@ -35,6 +35,17 @@ pub struct Table {
     actuators: usize,
 }
 
+/// A time that the mean voltages of successive stretches have reached.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Reached {
+    /// The time (s); none at the beginning.
+    time: Option<f64>,
+    /// The last row up to it, or the first.
+    row: usize,
+    /// Integrals of the voltages from the first row to it (V·s).
+    integrals: Vec<f64>,
+}
+
 impl Table {
     /// Voltages (V), rows × actuators.
     pub fn volts(&self) -> &[f64] {
@@ -87,6 +98,24 @@ impl Table {
         }
     }
 
+    /// [`mean`](Self::mean) for stretches that follow on each other: what was found for the end of the last one is kept in `reached`.
+    pub(super) fn mean_onwards(&self, from: f64, to: f64, reached: &mut Reached, out: &mut [f64]) {
+        let Reached { time, row, integrals } = reached;
+        if *time != Some(from) {
+            *row = self.rows_until(from).saturating_sub(1);
+            *integrals = (0..self.actuators).map(self.integral_after(*row, from)).collect();
+        }
+        while self.times.get(*row + 1).is_some_and(|next| *next <= to) {
+            *row += 1;
+        }
+        let end = self.integral_after(*row, to);
+        for (a, (out, integral)) in out.iter_mut().zip(integrals).enumerate() {
+            let start = std::mem::replace(integral, end(a));
+            *out = (*integral - start) / (to - from);
+        }
+        *time = Some(to);
+    }
+
     /// Number of rows up to time `t` (s): at once for times at equal distances.
     fn rows_until(&self, t: f64) -> usize {
         let last = self.times.len() - 1;
@@ -100,7 +129,11 @@ impl Table {
 
     /// The integral of an actuator's voltage from the first row to `t` (V·s).
     fn integral(&self, t: f64) -> impl Fn(usize) -> f64 + '_ {
-        let row = self.rows_until(t).saturating_sub(1);
+        self.integral_after(self.rows_until(t).saturating_sub(1), t)
+    }
+
+    /// [`integral`](Self::integral) with the last row up to `t` (s), or the first.
+    fn integral_after(&self, row: usize, t: f64) -> impl Fn(usize) -> f64 + '_ {
         let past = t - self.times[row];
         move |a| {
             let at = row * self.actuators + a;
@@ -154,6 +187,25 @@ mod tests {
         for (from, to, mean) in [(0.0, 1.0, 5.0), (0.5, 1.0, 7.5), (0.9, 1.1, -0.25), (-1.0, 1.0, 2.5), (1.5, 4.0, -10.0)] {
             table.mean(from, to, &mut out);
             assert!((out[0] - mean).abs() < 1e-6, "{from} {to}: {}", out[0]);
+        }
+    }
+
+    #[test]
+    fn means_of_successive_stretches_are_those_of_each() {
+        let times: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k) + 1e-3 * f64::from(k * k)).collect();
+        let volts = (0..80).map(|k| 100.0 * f64::from(k).sin()).collect();
+        let table = Table::new(times, volts, 2).unwrap();
+        for width in [0.01, 0.1, 0.37, 2.0] {
+            let (mut reached, mut onwards, mut mean) = (Reached::default(), [0.0; 2], [0.0; 2]);
+            for k in -3..700 {
+                // Now and then a stretch is left out.
+                let [from, to] = [k, k + 1].map(|k| width * f64::from(k));
+                if k % 7 != 0 {
+                    table.mean_onwards(from, to, &mut reached, &mut onwards);
+                    table.mean(from, to, &mut mean);
+                    assert_eq!(onwards, mean, "{from} {to}");
+                }
+            }
         }
     }
 

@@ -10,6 +10,7 @@ pub const CURVE_POINTS: usize = 5;
 pub struct Curve {
     /// Negative and positive side.
     sides: [Side; 2],
+    is_zero: bool,
 }
 
 /// One side, by the distance from the origin.
@@ -64,7 +65,7 @@ impl Side {
 
 impl Curve {
     /// 0 everywhere.
-    pub const ZERO: Self = Self { sides: [Side::EMPTY; 2] };
+    pub const ZERO: Self = Self { sides: [Side::EMPTY; 2], is_zero: true };
 
     /// A curve through the points at `knots` (distances from the origin, from there outwards; 0 for a side without points) on the negative and the
     /// positive side, with its `values` there.
@@ -72,7 +73,8 @@ impl Curve {
         let width = knots[0][0] + knots[1][0];
         let first = |side: usize| if knots[side][0] > 0.0 { values[side][0] } else { 0.0 };
         let origin = if width > 0.0 { (first(1) - first(0)) / width } else { 0.0 };
-        Self { sides: [Side::new(knots[0], values[0], -origin), Side::new(knots[1], values[1], origin)] }
+        let sides = [Side::new(knots[0], values[0], -origin), Side::new(knots[1], values[1], origin)];
+        Self { sides, is_zero: largest(&sides) == 0.0 }
     }
 
     /// A curve through equidistant points up to the distances `ends` on the negative and the positive side; 0 for a side without points.
@@ -94,12 +96,12 @@ impl Curve {
 
     /// True if it is 0 everywhere.
     pub fn is_zero(&self) -> bool {
-        self.largest() == 0.0
+        self.is_zero
     }
 
     /// Largest absolute value of a point.
     pub fn largest(&self) -> f64 {
-        self.sides.iter().flat_map(|side| side.values).fold(0.0, |largest, value| value.abs().max(largest))
+        largest(&self.sides)
     }
 
     /// The steepest rise between the last points: a cubic is steepest at its ends or where its second derivative is 0.
@@ -127,6 +129,10 @@ impl Curve {
         let [value, slope] = self.sides[usize::from(x > 0.0)].at(x.abs());
         [value, if x > 0.0 { slope } else { -slope }]
     }
+}
+
+fn largest(sides: &[Side; 2]) -> f64 {
+    sides.iter().flat_map(|side| side.values).fold(0.0, |largest, value| value.abs().max(largest))
 }
 
 #[cfg(test)]

@@ -104,30 +104,39 @@ impl JointExtensions {
         self.softening != 0.0 || !self.extensions.moment_of_curvature.is_zero()
     }
 
+    /// Two numbers of each joint of quad `k`; 0 where there is none.
+    fn of_joints(&self, k: usize, of: impl Fn(usize) -> [f64; 2]) -> [Lanes; 2] {
+        let of: [[f64; 2]; 4] = std::array::from_fn(|lane| if self.joint[k].lane(lane) > 0.0 { of(lane) } else { [0.0; 2] });
+        [0, 1].map(|number| Lanes::new(of.map(|numbers| numbers[number])))
+    }
+
     /// Elastic torque of softening and of the curve of the deviation, and its slope, at the elastic angle δ of quad `k`.
     fn elastic(&self, k: usize, quad: &Quad, delta: Lanes) -> (Lanes, Lanes) {
         let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
         if self.softening != 0.0 {
             let most = 1.0 - LEAST_STIFFNESS;
             let exponent = self.extensions.softening_exponent;
-            let share = |delta: f64| match exponent {
-                2.0 => self.softening * delta * delta,
-                _ => self.extensions.softened(delta / self.link),
-            };
-            let stiffness = self.joint[k] * quad.stiffness;
-            torque = stiffness * delta.map(|delta| share(delta).min(most) * delta);
-            slope = stiffness * delta.map(|delta| if share(delta) < most { (exponent + 1.0) * share(delta) } else { most });
+            let [softened, tangent] = self.of_joints(k, |lane| {
+                let delta = delta.lane(lane);
+                let share = match exponent {
+                    2.0 => self.softening * delta * delta,
+                    _ => self.extensions.softened(delta / self.link),
+                };
+                [share.min(most) * delta, if share < most { (exponent + 1.0) * share } else { most }]
+            });
+            torque = quad.stiffness * softened;
+            slope = quad.stiffness * tangent;
         }
         let curve = &self.extensions.moment_of_curvature;
         if !curve.is_zero() {
             // Joints that point to the left turn the other way.
-            let of: [[f64; 2]; 4] = std::array::from_fn(|lane| {
+            let [moment, tangent] = self.of_joints(k, |lane| {
                 let sign = sense(lane);
                 let [moment, tangent] = curve.at(sign * delta.lane(lane) / self.link);
                 [sign * moment, tangent / self.link]
             });
-            torque += -(self.joint[k] * Lanes::new(of.map(|[moment, _]| moment)));
-            slope += -(self.joint[k] * Lanes::new(of.map(|[_, tangent]| tangent)));
+            torque += -moment;
+            slope += -tangent;
         }
         (torque, slope)
     }
@@ -155,17 +164,11 @@ impl JointExtensions {
 
     /// Extra torques (dyn·cm) at elastic angle (rad) and rate (rad/s), for records, in the same sense.
     pub(super) fn now(&self, k: usize, quad: &Quad, delta: Lanes, rate: Lanes) -> Lanes {
-        let friction = self.resisting(rate).0;
+        let [friction, _] = self.of_joints(k, |lane| self.resistance(lane, rate.lane(lane)));
         let stored = self.memory[k].iter().zip(&self.extensions.loss);
         let stored = stored.fold(Lanes::ZERO, |sum, (q, share)| sum + Lanes::splat(*share) * *q);
         let slips = self.slips_of(k).fold(Lanes::ZERO, |sum, (elastic, [per_angle, _])| sum + Lanes::splat(per_angle) * *elastic);
-        self.at_rest(k, quad, delta) - self.joint[k] * (friction + slips) - quad.stiffness * stored
-    }
-
-    /// Moment against the rates of four joints, and its derivative.
-    fn resisting(&self, rate: Lanes) -> (Lanes, Lanes) {
-        let of: [[f64; 2]; 4] = std::array::from_fn(|lane| self.resistance(lane, rate.lane(lane)));
-        (Lanes::new(of.map(|[moment, _]| moment)), Lanes::new(of.map(|[_, slope]| slope)))
+        self.at_rest(k, quad, delta) - (friction + self.joint[k] * slips) - quad.stiffness * stored
     }
 
     /// Moment against the rate (rad/s) of the joint in a lane, and its derivative.
@@ -193,13 +196,13 @@ impl JointExtensions {
     }
 
     /// Slope s and constant part e* + s u* of friction about the rate `u` of the joint in a lane.
-    fn friction(&self, lane: usize, u: f64, turned_back: bool) -> (f64, f64) {
+    fn friction(&self, lane: usize, u: f64, turned_back: bool) -> [f64; 2] {
         let [moment, slope] = self.resistance(lane, u);
         // A curve of the rate is smooth.
         if (!self.is_repeated() || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
-            (slope, slope * u - moment)
+            [slope, slope * u - moment]
         } else {
-            (if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0)
+            [if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0]
         }
     }
 
@@ -230,9 +233,9 @@ impl JointExtensions {
                 slope += joint * (half * held);
             }
             if self.friction != 0.0 {
-                let of: [_; 4] = std::array::from_fn(|lane| self.friction(lane, rate.lane(lane), self.turned_back[k][lane]));
-                slope += joint * Lanes::new(of.map(|(slope, _)| slope));
-                torque += joint * Lanes::new(of.map(|(_, rest)| rest));
+                let [tangent, rest] = self.of_joints(k, |lane| self.friction(lane, rate.lane(lane), self.turned_back[k][lane]));
+                slope += tangent;
+                torque += rest;
             }
             if self.extensions.has_loss() {
                 for (([_, _, kept, added], q), share) in self.prony.iter().zip(&self.memory[k]).zip(&self.extensions.loss) {
@@ -258,9 +261,9 @@ impl JointExtensions {
             let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
             before = quad.mean[0].level(1);
             if self.is_repeated() {
-                for lane in 0..4 {
+                for lane in (0..4).filter(|lane| self.joint[k].lane(*lane) > 0.0) {
                     let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
-                    let (slope, rest) = self.friction(lane, before, self.turned_back[k][lane]);
+                    let [slope, rest] = self.friction(lane, before, self.turned_back[k][lane]);
                     let put = slope * now - rest;
                     changed = changed.max((put - self.resistance(lane, now)[0]).abs() / self.friction);
                     self.turned_back[k][lane] |= now * before < 0.0;
@@ -299,7 +302,7 @@ impl JointExtensions {
         for (at, weight) in GAUSS {
             let arm = (Lanes::splat(0.5 + 0.5 * at) - quad.middle) * quad.reach;
             let speed = speed + rate * arm;
-            let per_speed = speed.map(|speed| self.extensions.drag_per_speed(self.width, speed));
+            let per_speed = speed.map(|v| if v == 0.0 { 0.0 } else { self.extensions.drag_per_speed(self.width, v) });
             let part = Lanes::splat(-0.5 * weight) * per_speed * quad.reach.abs() * speed;
             force += part;
             moment += part * arm;
