@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::combinations::Combination;
 use super::residual_tests::ResidualTest;
 
 /// Result of a diagnosis in a word.
@@ -226,6 +227,8 @@ pub struct Diagnosis {
     pub candidates: Vec<Ranked>,
     /// Nearly collinear parameters.
     pub correlations: Vec<Correlation>,
+    /// What correlated or tied parameters determine together.
+    pub combinations: Vec<Combination>,
     /// Condition number of the scaled information of the extended model.
     pub condition: f64,
     /// The next measurement, where causes are tied or data insufficient.

@@ -306,6 +306,14 @@ impl<'a> Estimator<'a> {
         Ok(self.linearised(model, runs, &[])?.1)
     }
 
+    /// The information JᵀJ of a model's coordinates in `runs`.
+    ///
+    /// # Errors
+    /// As [`derivatives`](Self::derivatives).
+    pub(super) fn information(&self, model: &Model, runs: &[usize]) -> Result<DMatrix<f64>, DiagnoseError> {
+        Ok(Linearised::new(self.linearised(model, runs, &[])?, true).information)
+    }
+
     /// Residuals (runs × values) and their derivatives (coordinates × runs × values), of which those by the first coordinates may be `known`.
     fn linearised(
         &self,

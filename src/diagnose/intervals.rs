@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::DiagnoseError;
+use super::combinations::CORRELATED;
 use super::diagnosis::Correlation;
 use super::fit::coordinates;
 use super::plant::Model;
@@ -77,7 +78,7 @@ pub(super) fn intervals_of(search: &Search, scored: &Scored, numerics: &[f64]) -
         ends.push(sides);
         for j in 0..k {
             let coefficient = naive[(k, j)] / (naive[(k, k)] * naive[(j, j)]).sqrt();
-            if coefficient.abs() > 0.95 {
+            if coefficient.abs() > CORRELATED {
                 correlations.push(Correlation { between: [name(j), name(k)], coefficient });
             }
         }

@@ -13,6 +13,7 @@
 
 pub mod bench;
 mod candidates;
+pub mod combinations;
 mod curve;
 pub mod dataset;
 pub mod diagnosis;

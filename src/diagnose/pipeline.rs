@@ -1,6 +1,7 @@
 //! The diagnosis of a plant, from its measured runs to a [`Diagnosis`].
 
 use super::DiagnoseError;
+use super::combinations::combinations;
 use super::curve::curve;
 use super::dataset::Role;
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Nearest, Part, Ranked, RunError, Stage, Verdict};
@@ -119,6 +120,8 @@ pub fn diagnose(
     let above = |scored: &Scored| scored.above(search.estimator.count(&search.split.all()));
     progress("tied causes");
     let tied = ties(&search, &best, &replaced, coarse_total);
+    let others: Vec<&Term> = tied.iter().filter_map(|(_, trial)| trial.scored.model().terms.last()).collect();
+    let combinations = combinations(&search, &best, &others)?;
     let mut effects = Vec::new();
     if refined {
         effects.push(discretisation(&search, &best, &coarse));
@@ -197,6 +200,7 @@ pub fn diagnose(
             verdict,
             &Findings {
                 effects: &effects,
+                combinations: &combinations,
                 place_in_words: &|place| plant.place_in_words(place),
                 left: unexplained_fraction,
                 has_rest,
@@ -222,6 +226,7 @@ pub fn diagnose(
         extended,
         candidates: trials.iter().map(ranked).collect(),
         correlations: intervals.correlations.clone(),
+        combinations,
         condition: intervals.condition,
         effects,
         next_experiment,
@@ -378,9 +383,10 @@ fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Resu
     } else {
         calibrated.clone()
     };
-    // Two causes that cost more than the bench's faults alone are not what is missing.
-    search.limit = if has_faults { search.cost(calibrated) } else { f64::INFINITY };
     search.set_unexplained(&start);
+    // Two causes that cost more than the bench's faults alone are not what is missing where these leave next to nothing.
+    let may_be_all = has_faults && search.share_left(calibrated) <= LEFT_SHARE;
+    search.limit = if may_be_all { search.cost(calibrated) } else { f64::INFINITY };
     let mut causes = select(search, &start, is_insufficient)?;
     search.limit = f64::INFINITY;
     // Causes that leave next to nothing without any fault are no faults.

@@ -311,6 +311,10 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
             fixed(c.coefficient, 3)
         );
     }
+    for combination in &d.combinations {
+        let words = combination.words();
+        let _ = writeln!(out, "<p>{}{}.</p>", escape(&words[..1].to_uppercase()), escape(&words[1..]));
+    }
     let _ = writeln!(
         out,
         "<p class=\"small\">Condition of the fit, the ratio of the largest to the smallest eigenvalue of its scaled information: {}.</p>",

@@ -494,14 +494,7 @@ impl Search<'_> {
 
     /// The best screened starts of `count` different candidates.
     pub(super) fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
-        let mut chosen: Vec<Model> = Vec::new();
-        for (_, model) in screened {
-            let last = |model: &Model| model.terms.last().map(|term| term.candidate);
-            if chosen.len() < count && !chosen.iter().any(|other| last(other) == last(model)) {
-                chosen.push(model.clone());
-            }
-        }
-        chosen
+        first_of_each(screened, count, |term| term.candidate)
     }
 
     /// The best screened candidates fitted on top of `from`, best on held-out runs first, and the screening.
@@ -776,7 +769,8 @@ impl Search<'_> {
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();
             let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m);
-            for model in self.finalists(screened.ranked.iter().filter(is_promising), most) {
+            // One law of each cause: the others are tried once it has the place.
+            for model in first_of_each(screened.ranked.iter().filter(is_promising), most, |term| self.id(term.candidate)) {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
                 if let Ok(scored) = self.ranked_beyond(&model, &screened) {
@@ -819,6 +813,22 @@ fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
     let mut model = base.clone();
     model.terms.extend(terms);
     model
+}
+
+/// The first `count` models whose last terms differ in `key`.
+fn first_of_each<'m, K: PartialEq>(
+    screened: impl IntoIterator<Item = &'m (f64, Model)>,
+    count: usize,
+    key: impl Fn(&Term) -> K,
+) -> Vec<Model> {
+    let mut chosen: Vec<Model> = Vec::new();
+    let last = |model: &Model| model.terms.last().map(&key);
+    for (_, model) in screened {
+        if chosen.len() < count && !chosen.iter().any(|other| last(other) == last(model)) {
+            chosen.push(model.clone());
+        }
+    }
+    chosen
 }
 
 /// The residuals of runs, one after the other.

@@ -11,12 +11,15 @@ const LEAST_RUNS: usize = 4;
 
 /// A constant may make up for what the law of another cause lacks if that place's free form would take this share of what it takes.
 const TAKEN_BY_LAW: f64 = 0.9;
+/// ... and beside the constant it still takes this share of what the constant takes: a constant that is no law's rest leaves nothing to it.
+const LEFT_BY_CONSTANT: f64 = 0.02;
 
 /// How firmly a cause stands.
 pub(super) struct Standing {
     /// Share of resamples in which it is chosen; none with few runs.
     pub stability: Option<f64>,
-    /// True for a constant in the stead of which the free form of another cause's place would do as well: it may be what the law of that cause lacks.
+    /// True for a constant in the stead of which the free form of another cause's place would do as well, and beside which it still finds something: the
+    /// constant may be what the law of that cause lacks.
     pub is_left_by_law: bool,
 }
 
@@ -31,23 +34,30 @@ pub(super) fn standing(search: &Search, best: &Scored, without: &Scored, index: 
         search.screen_of(without, |candidate| if candidate.is_free_form { is_constant } else { !candidate.is_variant })?;
     Ok(Standing {
         stability: stability(search, best, without, index, &screened),
-        is_left_by_law: is_left_by_law(search, best, without, index, &screened),
+        is_left_by_law: is_constant && is_left_by_law(search, best, without, index, &screened)?,
     })
 }
 
-fn is_left_by_law(search: &Search, best: &Scored, without: &Scored, index: usize, screened: &Screened) -> bool {
+fn is_left_by_law(
+    search: &Search,
+    best: &Scored,
+    without: &Scored,
+    index: usize,
+    screened: &Screened,
+) -> Result<bool, DiagnoseError> {
     let own = search.candidate(&best.model().terms[index]);
     let others = || without.model().terms.iter().map(|term| search.candidate(term)).filter(|other| !other.is_constant);
-    let is_law = |model: &Model| {
-        let free = model.terms.last().map(|term| search.candidate(term)).filter(|free| free.is_free_form);
+    let is_law = |free: &Candidate| {
         // A free form of the constant's own place holds the constant.
-        free.is_some_and(|free| {
-            let is_of = |candidate: &Candidate| candidate.places.iter().any(|place| free.places.contains(place));
-            !is_of(own) && others().any(is_of)
-        })
+        let is_of = |candidate: &Candidate| candidate.places.iter().any(|place| free.places.contains(place));
+        free.is_free_form && !is_of(own) && others().any(is_of)
     };
-    let most = screened.ranked.iter().filter(|(_, model)| is_law(model)).map(|(gain, _)| *gain).fold(0.0, f64::max);
-    own.is_constant && most > TAKEN_BY_LAW * (without.total() - best.total())
+    let most = |screened: &Screened| {
+        let of_law = |(_, model): &&(f64, Model)| model.terms.last().is_some_and(|term| is_law(search.candidate(term)));
+        screened.ranked.iter().filter(of_law).map(|(gain, _)| *gain).fold(0.0, f64::max)
+    };
+    let gain = without.total() - best.total();
+    Ok(most(screened) > TAKEN_BY_LAW * gain && most(&search.screen_of(best, is_law)?) > LEFT_BY_CONSTANT * gain)
 }
 
 /// Share of resamples, which leave out one or two of the runs, in which term `index` of `best` is chosen: in which it lowers χ² of the model `without` it by

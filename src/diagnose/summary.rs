@@ -1,5 +1,6 @@
 //! The verdict of a diagnosis in a sentence.
 
+use super::combinations::Combination;
 use super::diagnosis::{Adopted, Part, Verdict};
 use super::names;
 use super::residual_tests::ResidualTest;
@@ -52,6 +53,8 @@ fn located(effect: &Adopted, place_in_words: &dyn Fn(&str) -> String) -> String 
 pub(super) struct Findings<'a> {
     /// All adopted causes.
     pub(super) effects: &'a [Adopted],
+    /// What causes determine together.
+    pub(super) combinations: &'a [Combination],
     /// Names of places in a sentence.
     pub(super) place_in_words: &'a dyn Fn(&str) -> String,
     /// The unexplained fraction.
@@ -70,7 +73,8 @@ pub(super) struct Findings<'a> {
 
 /// The verdict in a sentence.
 pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
-    let Findings { effects, place_in_words, left, has_rest, insufficient, resolution, refined, failing } = *findings;
+    let Findings { effects, combinations, place_in_words, left, has_rest, insufficient, resolution, refined, failing } =
+        *findings;
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
     let name = |effect: &Adopted| {
@@ -104,7 +108,8 @@ pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
                     format!("{} cannot be told from {}", names::cause(&effect.id), others.join(", "))
                 })
                 .collect();
-            format!("The simulation lacks: {named}; in these data {}{but}.", ties.join("; "))
+            let known: String = combinations.iter().map(|combination| format!("; {}", combination.words())).collect();
+            format!("The simulation lacks: {named}; in these data {}{known}{but}.", ties.join("; "))
         }
         Verdict::Unexplained => match (insufficient, physics.is_empty()) {
             (Some(insufficient), _) => {
@@ -134,6 +139,7 @@ mod tests {
 
     const NOTHING: Findings = Findings {
         effects: &[],
+        combinations: &[],
         place_in_words: &str::to_owned,
         left: 0.0,
         has_rest: false,

@@ -290,6 +290,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
             .map(|fit| Ranked { id: name(fit), form: form(fit), rmse_heldout_mm: (fit.chi2 / count).sqrt(), delta_bic: fit.chi2 + count.ln() - nominal.chi2 })
             .collect(),
         correlations: Vec::new(),
+        combinations: Vec::new(),
         condition: 1.0,
         next_experiment: (verdict == Verdict::Tied).then(|| {
             "weigh the sheet (mass), film the root and the whole shape at rest and under a slow voltage (clamp, curvature, gain), and let it ring from \

@@ -24,7 +24,7 @@ pub const AREAL_MASS: Effect = Effect {
     fitting: Fitting::Candidate {
         on: fits::any,
         variants: &[],
-        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }],
+        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.01], &[1.05]], given: &[] }],
     },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.mass_scale *= p[0]),

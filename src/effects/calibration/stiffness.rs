@@ -24,7 +24,7 @@ pub const STIFFNESS: Effect = Effect {
     fitting: Fitting::Candidate {
         on: fits::any,
         variants: &[],
-        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.05]], given: &[] }],
+        forms: &[Form { fitted: &[("scale", 0.1)], starts: &[&[1.01], &[1.05]], given: &[] }],
     },
     shape: None,
     action: Action::Robot(|p, robot| robot.extensions.stiffness_scale *= p[0]),

@@ -44,8 +44,11 @@ pub(super) struct JointExtensions {
     torque: Vec<Lanes>,
     /// 1 where there is a joint.
     joint: Vec<Lanes>,
-    /// Mean rates of the joints in the last step (rad/s).
+    /// Mean rates of the joints in the last step (rad/s), and the moment against them with its derivative.
     rates: Vec<Lanes>,
+    resisting: Vec<[Lanes; 2]>,
+    /// Slope s and constant part e* + s u* of friction in the last repetition.
+    friction_put: Vec<[Lanes; 2]>,
     /// True for joints whose rate changed sign in this step's repetitions.
     turned_back: Vec<[bool; 4]>,
     /// q_j of the Prony chain (rad).
@@ -67,7 +70,7 @@ impl JointExtensions {
             let there = |lane: usize| if k + lane > 0 && quad.mass.lane(lane) > 0.0 { 1.0 } else { 0.0 };
             Lanes::new(std::array::from_fn(there))
         });
-        Some(Self {
+        let mut new = Self {
             softening: extensions.softening / (link * link),
             hardening,
             root_rate: 0.0,
@@ -79,12 +82,28 @@ impl JointExtensions {
             torque: vec![Lanes::ZERO; count],
             joint: joint.collect(),
             rates: vec![Lanes::ZERO; count],
+            resisting: vec![[Lanes::ZERO; 2]; count],
+            friction_put: vec![[Lanes::ZERO; 2]; count],
             turned_back: vec![[false; 4]; count],
             memory: vec![Default::default(); count],
             slips: vec![Lanes::ZERO; count * extensions.slips.len()],
             extensions: extensions.clone(),
             link,
-        })
+        };
+        new.resist();
+        Some(new)
+    }
+
+    /// Sets the moments against the present rates.
+    fn resist(&mut self) {
+        if self.friction != 0.0 {
+            self.resisting = (0..self.rates.len()).map(|k| self.resisting_at(k, self.rates[k])).collect();
+        }
+    }
+
+    /// Moment against the rates of quad `k`'s joints, and its derivative.
+    fn resisting_at(&self, k: usize, rate: Lanes) -> [Lanes; 2] {
+        self.of_joints(k, |lane| self.resistance(lane, rate.lane(lane)))
     }
 
     pub(super) fn set_time_step(&mut self, step: f64, quads: &[Quad]) {
@@ -164,7 +183,7 @@ impl JointExtensions {
 
     /// Extra torques (dyn·cm) at elastic angle (rad) and rate (rad/s), for records, in the same sense.
     pub(super) fn now(&self, k: usize, quad: &Quad, delta: Lanes, rate: Lanes) -> Lanes {
-        let [friction, _] = self.of_joints(k, |lane| self.resistance(lane, rate.lane(lane)));
+        let [friction, _] = self.resisting_at(k, rate);
         let stored = self.memory[k].iter().zip(&self.extensions.loss);
         let stored = stored.fold(Lanes::ZERO, |sum, (q, share)| sum + Lanes::splat(*share) * *q);
         let slips = self.slips_of(k).fold(Lanes::ZERO, |sum, (elastic, [per_angle, _])| sum + Lanes::splat(per_angle) * *elastic);
@@ -195,9 +214,10 @@ impl JointExtensions {
         self.turned_back.fill([false; 4]);
     }
 
-    /// Slope s and constant part e* + s u* of friction about the rate `u` of the joint in a lane.
-    fn friction(&self, lane: usize, u: f64, turned_back: bool) -> [f64; 2] {
-        let [moment, slope] = self.resistance(lane, u);
+    /// Slope s and constant part e* + s u* of friction about the last rate of the joint in a lane of quad `k`.
+    fn friction(&self, k: usize, lane: usize) -> [f64; 2] {
+        let [moment, slope] = self.resisting[k].map(|of| of.lane(lane));
+        let (u, turned_back) = (self.rates[k].lane(lane), self.turned_back[k][lane]);
         // A curve of the rate is smooth.
         if (!self.is_repeated() || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
             [slope, slope * u - moment]
@@ -207,7 +227,7 @@ impl JointExtensions {
     }
 
     /// Adds the extra torques, linearised about the last rates, to the joints: their impulses over `share` (s).
-    pub(super) fn load(&self, quads: &mut [Quad], share: f64) {
+    pub(super) fn load(&mut self, quads: &mut [Quad], share: f64) {
         let share = Lanes::splat(share);
         let half = Lanes::splat(self.half_step);
         let mut before = f64x2::ZERO;
@@ -233,7 +253,8 @@ impl JointExtensions {
                 slope += joint * (half * held);
             }
             if self.friction != 0.0 {
-                let [tangent, rest] = self.of_joints(k, |lane| self.friction(lane, rate.lane(lane), self.turned_back[k][lane]));
+                let [tangent, rest] = self.of_joints(k, |lane| self.friction(k, lane));
+                self.friction_put[k] = [tangent, rest];
                 slope += tangent;
                 torque += rest;
             }
@@ -260,14 +281,16 @@ impl JointExtensions {
         for (k, quad) in quads.iter().enumerate() {
             let rate = self.joint[k] * (quad.mean[0] - quad.mean[0].inner(before));
             before = quad.mean[0].level(1);
-            if self.is_repeated() {
+            if self.friction != 0.0 {
+                let [slope, rest] = self.friction_put[k];
+                let resisting = self.resisting_at(k, rate);
+                let missed = (slope * rate - rest - resisting[0]).abs();
+                let (now, before) = (rate, self.rates[k]);
                 for lane in (0..4).filter(|lane| self.joint[k].lane(*lane) > 0.0) {
-                    let (now, before) = (rate.lane(lane), self.rates[k].lane(lane));
-                    let [slope, rest] = self.friction(lane, before, self.turned_back[k][lane]);
-                    let put = slope * now - rest;
-                    changed = changed.max((put - self.resistance(lane, now)[0]).abs() / self.friction);
-                    self.turned_back[k][lane] |= now * before < 0.0;
+                    changed = changed.max(missed.lane(lane) / self.friction);
+                    self.turned_back[k][lane] |= now.lane(lane) * before.lane(lane) < 0.0;
                 }
+                self.resisting[k] = resisting;
             }
             self.rates[k] = rate;
         }
@@ -329,6 +352,7 @@ impl JointExtensions {
         for (slot, values) in slots.zip(saved.as_chunks().0) {
             *slot = Lanes::new(*values);
         }
+        self.resist();
     }
 }
 
