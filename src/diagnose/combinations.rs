@@ -73,12 +73,11 @@ impl Combination {
         let [first, second, both] = [variances[0] * of_a * of_a, variances[1] * of_b * of_b, covariance * of_a * of_b];
         let least = -both / second;
         let power = least.signum();
-        if !((least - power).abs() < NEAR_ONE) {
-            return None;
-        }
+        // False for infinite variances, whose quotient is not a number.
+        let is_simple = (least - power).abs() < NEAR_ONE;
         let error = (first + 2.0 * power * both + second).max(0.0).sqrt();
         let errors_alone = [first, second].map(f64::sqrt);
-        let is_determined = errors_alone.iter().all(|alone| error <= DETERMINED * alone);
+        let is_determined = is_simple && errors_alone.iter().all(|alone| error <= DETERMINED * alone);
         let of = [a, b].map(|c| format!("{} {}", c.id, c.free.name));
         is_determined.then(|| Self { of, power, unit: unit.into(), error, errors_alone })
     }
