@@ -273,6 +273,8 @@ fn what_cannot_be_applied_is_refused_by_name() {
         ("tip-mass", vec![("mass_kg", 1.0)], "mass_kg"),
         ("tip-mass", vec![("mass_g", -1.0)], "between"),
         ("tip-mass", vec![("mass_g", 0.1), ("position_mm", 400.0)], "end"),
+        ("free-clamp", vec![("compliance_2_rad_per_n_m", -0.1)], "between"),
+        ("free-clamp", vec![("range_mn_m", 0.0), ("compliance_2_rad_per_n_m", 0.1)], "between"),
         ("weak-actuator", vec![("actuator", 2.0), ("gain", 0.5)], "1 actuators"),
         ("stiffness", vec![("scale", f64::NAN)], "between"),
     ] {
@@ -324,6 +326,10 @@ fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     assert_eq!(tip(&rest).to_bits(), tip(&full).to_bits());
 }
 
+/// The weights of `free-clamp`.
+const COMPLIANCES: [&str; 4] =
+    ["compliance_1_rad_per_n_m", "compliance_2_rad_per_n_m", "compliance_3_rad_per_n_m", "compliance_4_rad_per_n_m"];
+
 /// Largest distance between the right ends of two runs (cm).
 fn apart(a: &Run, b: &Run) -> f64 {
     let (a, b) = (&a.recording, &b.recording);
@@ -360,7 +366,14 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         ("below_4_v", d),
         ("below_5_v", e),
     ];
-    let cases: [(Effects, Effects); 10] = [
+    let soft = |c: f64| [1, 2, 3, 4].map(|k| (COMPLIANCES[k - 1], c));
+    let [s1, s2, s3, s4] = soft(0.7);
+    let cases: [(Effects, Effects); 12] = [
+        (&[("free-clamp", &[s1, s2, s3, s4])], &[("clamp-compliance", &[("compliance_rad_per_n_m", 0.7)])]),
+        (
+            &[("free-clamp", &[s1, s2, s3, s4, ("damping_s", 3e-3), ("range_mn_m", 1.0)])],
+            &[("clamp-compliance", &[("compliance_rad_per_n_m", 0.7), ("damping_s", 3e-3)])],
+        ),
         (
             &[(
                 "free-joint-memory",
@@ -393,6 +406,50 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         // Two ways to the same numbers: rounding only.
         assert!(change > 1e-3 && error < 1e-9, "{free:?}: {error:e} cm of {change}");
     }
+}
+
+#[test]
+fn a_clamp_of_any_curve_turns_by_the_compliance_up_to_its_moment() {
+    let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01"];
+    let moment = 4.804359999999999 * 980.0 * 5.0;
+    let stiff = tip(&run(CANTILEVER, &rest));
+    for (compliances, range) in [([0.2, 1.0, 0.4, 0.1], 3.0), ([0.0, 0.0, 0.0, 1.0], 3.0), ([1.0, 0.0, 0.0, 0.0], 2.0)] {
+        let values: Vec<_> = COMPLIANCES.into_iter().zip(compliances).chain([("range_mn_m", range)]).collect();
+        let soft = tip(&run(&with(CANTILEVER, "free-clamp", &values), &rest));
+        // The integral of the compliance up to the moment of the weight, in a thousand parts.
+        let parts = 1000;
+        // A compliance of less than a thousandth of the largest counts as that.
+        let compliances = compliances.map(|c: f64| c.max(1e-3));
+        let at = |k: f64| {
+            let point = (moment * k / 1000.0 / (1e4 * range / 3.0)).min(3.0);
+            let [low, high] = [point.floor(), point.ceil()].map(|of| compliances[of as usize]);
+            low + (high - low) * point.fract()
+        };
+        let turn: f64 = (0..parts).map(|k| 1e-7 * at(f64::from(k) + 0.5) * moment / f64::from(parts)).sum();
+        // The turn lowers the tip by the length times it; the sag shortens the lever. Seen: 9e-4.
+        assert!(((soft - stiff) / (-10.0 * turn) - 1.0).abs() < 3e-3, "{compliances:?}: {stiff} {soft} {turn}");
+    }
+}
+
+#[test]
+fn the_clamps_curve_is_linear_in_its_weights_near_a_rigid_clamp() {
+    // Positions change by the sum of what single weights change, up to the square of the weights: what a screening from zero relies on.
+    let plain = run(CANTILEVER, &[]).recording.positions;
+    let change = |weights: &[(usize, f64)]| -> Vec<f64> {
+        let values: Vec<_> = weights.iter().map(|(k, weight)| (COMPLIANCES[*k], *weight)).collect();
+        let moved = run(&with(CANTILEVER, "free-clamp", &values), &[]).recording.positions;
+        moved.iter().zip(&plain).map(|(a, b)| a - b).collect()
+    };
+    let error = |size: f64| {
+        let sum = [0, 1, 2, 3].map(|k| change(&[(k, size)]));
+        let whole = change(&[0, 1, 2, 3].map(|k| (k, size)));
+        let largest = whole.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let apart = |at: usize| (sum.iter().map(|of| of[at]).sum::<f64>() - whole[at]).abs();
+        (0..whole.len()).map(apart).fold(0.0, f64::max) / largest
+    };
+    let (small, large) = (error(0.005), error(0.05));
+    // Seen: 3.0e-3 and 1.8e-2 of the largest change.
+    assert!(small < 0.01 && large < 0.05, "{small} {large}");
 }
 
 #[test]

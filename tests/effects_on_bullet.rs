@@ -54,7 +54,7 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 17] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 20] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
@@ -72,6 +72,18 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 17] = [
     ("stiffness-softening", &[("softening_mm2", 2000.0), ("exponent", 1.0)]),
     ("structural-damping", &[("loss_factor", 0.05), ("exponent", 0.3)]),
     ("dry-friction", &[("moment_mn_m", 0.3), ("presliding_per_m", 0.5)]),
+    ("free-clamp", &[("range_mn_m", 4.0), ("compliance_1_rad_per_n_m", 2.0), ("compliance_3_rad_per_n_m", 0.5)]),
+    ("free-clamp", &[("range_mn_m", 4.0), ("compliance_2_rad_per_n_m", 2.0), ("compliance_4_rad_per_n_m", 1.0)]),
+    (
+        "free-clamp",
+        &[
+            ("compliance_1_rad_per_n_m", 2.0),
+            ("compliance_2_rad_per_n_m", 1.5),
+            ("compliance_3_rad_per_n_m", 1.2),
+            ("compliance_4_rad_per_n_m", 1.0),
+            ("damping_s", 5e-3),
+        ],
+    ),
 ];
 
 #[test]
@@ -91,6 +103,8 @@ fn a_cantilever_moves_as_on_the_planar_engine() {
             "free-moment-of-rate" => 3e-5,
             // Seen: 1.24e-5 with a damper.
             "clamp-compliance" if values.len() > 1 => 3e-5,
+            // Seen: 1.5e-4 and 8.5e-5 where parts of the curve are rigid, 5.7e-4 with a damper; Bullet's own errors halve with its step.
+            "free-clamp" => 1e-3,
             _ => 1e-5,
         };
         assert!(apart < limit * largest, "{id} {values:?}: {apart:e} of {largest}");
@@ -99,7 +113,7 @@ fn a_cantilever_moves_as_on_the_planar_engine() {
 
 #[test]
 fn a_cantilever_rests_as_on_the_planar_engine() {
-    for (id, values) in &ON_A_CANTILEVER[..6] {
+    for (id, values) in ON_A_CANTILEVER[..6].iter().chain(&ON_A_CANTILEVER[17..19]) {
         let robot = cantilever(0.03, id, values);
         let mut bullet = BulletEngine::new(&robot, 1e-5).unwrap();
         step(&mut bullet, &[-600.0], 150_000);
@@ -315,6 +329,8 @@ fn a_clamp_that_gives_goes_on_from_a_saved_state_with_the_same_bits() {
     assert!(BulletEngine::new(&softer, 1e-5).unwrap().load(1000, &state).is_err());
     let harder = cantilever(0.008, "clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("hardening_per_rad", 300.0)]);
     assert!(BulletEngine::new(&harder, 1e-5).unwrap().load(1000, &state).is_err());
+    let curved = cantilever(0.008, "free-clamp", &[("compliance_1_rad_per_n_m", 2.0)]);
+    assert!(BulletEngine::new(&curved, 1e-5).unwrap().load(1000, &state).is_err());
     // The planar engine starts its next step from the root's last rate.
     let new = || PlanarEngine::new(&harder, 1e-4).unwrap();
     let mut engine = new();

@@ -1,5 +1,7 @@
 #include "fixed.h"
 
+#include <cmath>
+
 #include "BulletDynamics/ConstraintSolver/btGeneric6DofSpring2Constraint.h"
 
 namespace bs {
@@ -20,11 +22,34 @@ FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, co
       damping_time_(damping_time),
       hardening_(hardening) {}
 
+void FixedConstraint::bend(btScalar width, const btScalar *compliances) {
+  width_ = width;
+  for (int i = 0; i < BS_CLAMP_POINTS; ++i) compliances_[i] = compliances[i];
+}
+
+void FixedConstraint::moment_of(btScalar turn, btScalar *moment, btScalar *compliance) const {
+  btScalar rest = std::abs(turn), below = 0;
+  for (int i = 0; i + 1 < BS_CLAMP_POINTS; ++i) {
+    const btScalar low = compliances_[i], high = compliances_[i + 1], whole = btScalar(0.5) * (low + high) * width_;
+    if (rest < whole) {
+      // The smaller root of low m + (high - low) m^2 / (2 width) = rest; the root is the compliance there.
+      const btScalar square = low * low + 2 * (high - low) / width_ * rest;
+      *compliance = std::sqrt(square > 0 ? square : btScalar(0));
+      *moment = std::copysign(below + 2 * rest / (low + *compliance), turn);
+      return;
+    }
+    rest -= whole;
+    below += width_;
+  }
+  *compliance = compliances_[BS_CLAMP_POINTS - 1];
+  *moment = std::copysign(below + rest / *compliance, turn);
+}
+
 void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
                                            const btContactSolverInfo &info) {
   btMultiBody *body = m_bodyA;
   // A compliance is none of Bullet's.
-  if ((AS_SHIPPED && compliance_ == 0) || !chain_.read(*body)) {
+  if ((AS_SHIPPED && compliance_ == 0 && !is_bent()) || !chain_.read(*body)) {
     return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
   }
 
@@ -89,6 +114,16 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
       out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
       out.m_cfm = softness * out.m_jacDiagABInv;
       out.m_rhs = (velocity - error * moment / whole) * out.m_jacDiagABInv;
+    }
+    if (is_bent() && i == TURN_ABOUT_Y) {
+      // phi + (h + T) omega = C(M), about the moment M* of the present turn and rate: C(M*) + c (M - M*). The impulse is -h M.
+      const btScalar rate = body->getBaseOmega().dot(row.angular), whole = info.m_timeStep + damping_time_;
+      btScalar moment, compliance;
+      moment_of(error + damping_time_ * rate, &moment, &compliance);
+      const btScalar softness = compliance / (info.m_timeStep * whole);
+      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
+      out.m_cfm = softness * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - (compliance * moment - damping_time_ * rate) / whole) * out.m_jacDiagABInv;
     }
     out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;

@@ -4,6 +4,7 @@
 
 #include "BulletDynamics/Featherstone/btMultiBodyFixedConstraint.h"
 
+#include "bullet_shim.h"
 #include "chain.h"
 
 namespace bs {
@@ -19,6 +20,11 @@ class FixedConstraint : public btMultiBodyFixedConstraint {
   FixedConstraint(btMultiBody *body, const btTransform &world);
   FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance,
                   btScalar damping_time, btScalar hardening);
+  // Lets the compliance depend on the moment: `compliances` at multiples of `width` from 0, linear between them, constant beyond.
+  void bend(btScalar width, const btScalar *compliances);
+  bool is_bent() const { return width_ > 0; }
+  btScalar width() const { return width_; }
+  btScalar bent_compliance(int point) const { return compliances_[point]; }
   const btVector3 &pivot() const { return m_pivotInA; }
   btScalar compliance() const { return compliance_; }
   btScalar damping_time() const { return damping_time_; }
@@ -26,7 +32,11 @@ class FixedConstraint : public btMultiBodyFixedConstraint {
   void createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data, const btContactSolverInfo &info) override;
 
  private:
+  // The moment of a turn, and the compliance there.
+  void moment_of(btScalar turn, btScalar *moment, btScalar *compliance) const;
   Chain chain_;
+  btScalar width_ = 0;                                // between two points of the curve (dyn cm); 0 without one
+  btScalar compliances_[BS_CLAMP_POINTS] = {0};       // at its points (rad/(dyn cm)), all positive
   btScalar compliance_ = 0;    // of the turn about y (rad/(dyn cm))
   btScalar damping_time_ = 0;  // its damping over its stiffness (s)
   btScalar hardening_ = 0;     // a of its moment phi (1 + (a phi)^2) / compliance (1/rad)

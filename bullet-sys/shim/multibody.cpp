@@ -235,6 +235,27 @@ int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pi
   });
 }
 
+int32_t bs_bent_constraint_add(bs_world *world, int32_t body, const double *pivot, double width, const double *compliances, double damping_time,
+                               double max_impulse, char *error, int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(world != nullptr && pivot != nullptr && compliances != nullptr, "null pointer");
+    require(max_impulse > 0, "the largest impulse must be positive");
+    require(width > 0 && std::isfinite(width), "a width must be positive and finite");
+    for (int i = 0; i < BS_CLAMP_POINTS; ++i)
+      require(compliances[i] > 0 && std::isfinite(compliances[i]), "a compliance must be positive and finite");
+    require(damping_time >= 0 && std::isfinite(damping_time), "a damping time must not be negative, and finite");
+    require(is_finite(pivot), "a pivot must be finite");
+    btMultiBody &multibody = world->multibody(body);
+    require(is_chain(multibody), "a tie that gives needs a chain");
+    auto constraint =
+        std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform(), bs::vector(pivot), 0, damping_time, 0);
+    constraint->bend(width, compliances);
+    constraint->setMaxAppliedImpulse(max_impulse);
+    world->constraints.push_back(std::move(constraint));
+    world->dynamics.addMultiBodyConstraint(world->constraints.back().get());
+  });
+}
+
 int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length) {
   return bs::guarded(nullptr, 0, [&] {
     require(world != nullptr && angles != nullptr && rates != nullptr, "null pointer");

@@ -38,7 +38,8 @@ impl Chain {
     fn new(robot: &Robot) -> Self {
         let lengths: Vec<f64> = robot.segments().iter().map(|segment| segment.length).collect();
         let bodies = robot.rigid_bodies();
-        let compliance = robot.extensions.clamp_compliance;
+        // Of a curve, the largest: the softest clamp holds least.
+        let compliance = robot.extensions.clamp_compliance + robot.extensions.clamp_curve.largest();
         let inertia = |(body, length): (&crate::model::RigidBody, &f64)| {
             let arm = body.middle * length;
             Inertia { mass: body.mass, moment: body.mass * arm, about_end: body.inertia + body.mass * arm * arm }

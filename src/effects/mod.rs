@@ -142,6 +142,7 @@ pub static EFFECTS: &[&Effect] = &[
     &calibration::AREAL_MASS,
     &numerics::DISCRETISATION,
     &structure::CLAMP_COMPLIANCE,
+    &structure::FREE_CLAMP,
     &structure::TIP_MASS,
     &structure::INITIAL_CURVATURE,
     &structure::STIFFNESS_SOFTENING,
@@ -330,6 +331,10 @@ pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Resul
             Action::Drive(change) => change(&applied.values, drive),
             _ => {}
         }
+    }
+    if !robot.extensions.clamp_curve.is_rigid() && robot.extensions.clamp_hardening != 0.0 {
+        let message = "cannot stand beside a clamp-compliance with hardening_per_rad: put both into the curve".into();
+        return Err(EffectError::Robot { id: "free-clamp", message });
     }
     Ok(())
 }

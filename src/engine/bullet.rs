@@ -90,9 +90,13 @@ impl BulletEngine {
         // The base's box stands at the origin.
         let com_to_box: Vec<f64> = boxes.iter().map(|link| link.com_to_box[0]).collect();
         let body = world.add_multibody(&boxes[0], &boxes[1..], [0.0 - com_to_box[0], 0.0, 0.0])?;
-        match robot.mount {
-            Mount::Clamped if extensions.clamp_compliance > 0.0 => {
-                let left_end = [-bodies[0].middle * segments[0].length, 0.0, 0.0];
+        let left_end = [-bodies[0].middle * segments[0].length, 0.0, 0.0];
+        match (robot.mount, extensions.curved_clamp()) {
+            (Mount::Clamped, Some(curve)) => {
+                let (width, damping) = (curve.width(), extensions.clamp_damping);
+                world.add_bent_constraint(body, left_end, width, curve.compliances(), damping, CLAMP_IMPULSE)?;
+            }
+            (Mount::Clamped, None) if extensions.clamp_compliance > 0.0 => {
                 world.add_sprung_constraint(
                     body,
                     left_end,
@@ -102,8 +106,8 @@ impl BulletEngine {
                     CLAMP_IMPULSE,
                 )?;
             }
-            Mount::Clamped => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
-            Mount::Ground => {
+            (Mount::Clamped, None) => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
+            (Mount::Ground, _) => {
                 world.add_ground(&Ground {
                     half_extents: GROUND_HALF_EXTENTS,
                     top: -0.5 * robot.collision_thickness,
@@ -113,7 +117,7 @@ impl BulletEngine {
                     collision_margin: COLLISION_MARGIN,
                 })?;
             }
-            Mount::Free => {}
+            (Mount::Free, _) => {}
         }
         let joints = robot.joints();
         let zeros = || vec![0.0; joints];

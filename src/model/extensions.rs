@@ -1,5 +1,6 @@
 //! What a robot has beyond the plain model. Everything is off by default, and off costs nothing and changes no bit.
 
+use super::clamp::ClampCurve;
 use super::curve::Curve;
 
 /// Additions to the plain robot that both engines know how to step. [`crate::effects`] sets them; the fields are in CGS units.
@@ -21,6 +22,8 @@ pub struct Extensions {
     pub clamp_damping: f64,
     /// a of the moment φ (1 + (a φ)²) over the compliance of a compliant clamp that turns by φ (1/rad).
     pub clamp_hardening: f64,
+    /// Turn of a clamped root as a curve of the moment, in series with the compliance. Not beside a hardening.
+    pub clamp_curve: ClampCurve,
     /// Masses fixed to the sheet.
     pub point_masses: Vec<PointMass>,
     /// Curvature at 0 V (1/cm), one per actuator, or none.
@@ -103,6 +106,7 @@ impl Default for Extensions {
             clamp_compliance: 0.0,
             clamp_damping: 0.0,
             clamp_hardening: 0.0,
+            clamp_curve: ClampCurve::RIGID,
             point_masses: Vec::new(),
             rest_curvature: Vec::new(),
             joint_gains: Vec::new(),
@@ -143,6 +147,11 @@ const LEAST_DRAG_RATIO: f64 = 1e-4;
 pub const AIR_DENSITY: f64 = 1.2e-3;
 
 impl Extensions {
+    /// The turn of a clamped root as a curve of the moment, everything in series; none if it is no curve but linear, hardening or rigid.
+    pub fn curved_clamp(&self) -> Option<ClampCurve> {
+        (!self.clamp_curve.is_rigid()).then(|| self.clamp_curve.in_series(self.clamp_compliance))
+    }
+
     /// Whether the joints' torque law has terms beyond eq. 1.
     pub fn bends_torque_law(&self) -> bool {
         self.softening != 0.0

@@ -12,12 +12,14 @@
 //! | static tip at −1000 V, m = 3 | −19.0 mm | −23.4 mm | −20 mm |
 
 mod builder;
+mod clamp;
 mod curve;
 mod extensions;
 mod laminate;
 mod robot;
 pub mod units;
 
+pub use clamp::{CLAMP_POINTS, ClampCurve};
 pub use curve::{CURVE_POINTS, Curve};
 pub use extensions::{
     AIR_DENSITY, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, Slip, StickSlip,

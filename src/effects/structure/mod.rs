@@ -3,6 +3,7 @@
 mod air_drag;
 mod clamp_compliance;
 mod dry_friction;
+mod free_clamp;
 mod free_drag;
 mod free_joint_memory;
 mod free_joint_slip;
@@ -17,6 +18,7 @@ mod tip_mass;
 pub use air_drag::AIR_DRAG;
 pub use clamp_compliance::CLAMP_COMPLIANCE;
 pub use dry_friction::DRY_FRICTION;
+pub use free_clamp::FREE_CLAMP;
 pub use free_drag::FREE_DRAG;
 pub use free_joint_memory::FREE_JOINT_MEMORY;
 pub use free_joint_slip::FREE_JOINT_SLIP;

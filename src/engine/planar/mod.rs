@@ -175,15 +175,11 @@ impl PlanarEngine {
         let levels = root.max(count - 1 - root) + 1;
         let blocks = if robot.mount == Mount::Ground && levels > LONGEST_WHOLE { levels.div_ceil(BLOCK) } else { 0 };
         let (mut quads, frictions) = bodies_in_quads(robot, &segments, &bodies, root, levels);
-        let base_joint = match robot.mount {
-            Mount::Clamped if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged { damping_time: extensions.clamp_damping },
-            Mount::Clamped => BaseJoint::Clamped,
-            _ => BaseJoint::Free,
-        };
+        let mut base_joint = base_joint(robot);
         if let BaseJoint::Hinged { .. } = base_joint {
             quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
-        set_implicit(&mut quads, &joint, base_joint, weight, time_step);
+        set_implicit(&mut quads, &joint, &mut base_joint, weight, time_step);
         let m = robot.motors_per_actuator;
         let rest_angles =
             extensions.rest_curvature.iter().flat_map(|curvature| vec![curvature * robot.link_length(); m]).collect();
@@ -264,6 +260,18 @@ impl PlanarEngine {
     fn of_body(&self, i: usize, what: impl Fn(&Quad) -> Lanes) -> f64 {
         let (quad, lane) = place(i, self.root);
         what(&self.quads[quad]).lane(lane)
+    }
+}
+
+/// How the root of `robot` is joined to the world; a curve's times are set with the length of the step.
+fn base_joint(robot: &Robot) -> BaseJoint {
+    let extensions = &robot.extensions;
+    let damping_time = extensions.clamp_damping;
+    match (robot.mount, extensions.curved_clamp()) {
+        (Mount::Clamped, Some(curve)) => BaseJoint::Curved { curve, damping_time, ahead: 0.0, share: 0.0 },
+        (Mount::Clamped, None) if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged { damping_time },
+        (Mount::Clamped, None) => BaseJoint::Clamped,
+        _ => BaseJoint::Free,
     }
 }
 

@@ -10,6 +10,7 @@ use wide::f64x2;
 
 use super::lanes::{fma, pair};
 use super::quad::{Arms, Quad, Spatial, Spatials};
+use crate::model::ClampCurve;
 
 /// What contact adds to the articulated inertia on the way from the tips to the base.
 pub(super) trait ContactTerms {
@@ -182,6 +183,16 @@ pub(super) enum BaseJoint {
     Free,
     /// Rigidly.
     Clamped,
+    /// By a hinge at its reference point that turns as a curve of the moment on it.
+    Curved {
+        curve: ClampCurve,
+        /// Damping over stiffness (s).
+        damping_time: f64,
+        /// Turn at which the moment acts over the mean rate, from the start of the step (s), with the damping.
+        ahead: f64,
+        /// Time over which the moment acts (s).
+        share: f64,
+    },
     /// By a hinge at its reference point, with the level's own torque and implicit terms.
     Hinged {
         /// Damping over stiffness (s).
@@ -215,6 +226,12 @@ fn root_motion<const SKEW: bool>(
     if let BaseJoint::Hinged { .. } = base_joint {
         let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
         return (whole, [turn, 0.0, 0.0]);
+    }
+    if let BaseJoint::Curved { curve, ahead, share, .. } = base_joint {
+        // I u = F − share·M with φ + ahead·u = φ(M), exactly: the root is the last to be eliminated.
+        let (inertia, force) = (whole.inertia[0], whole.force[0]);
+        let moment = curve.moment(root.angle.lane(0) + ahead * force / inertia, ahead * share / inertia);
+        return (whole, [(force - share * moment) / inertia, 0.0, 0.0]);
     }
     if let Some(by) = contact.take(0) {
         (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);

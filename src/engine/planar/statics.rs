@@ -12,6 +12,7 @@ use super::contact::FrictionCone;
 use super::lanes::{Four, Lanes, Two, inner};
 use super::law::ContactLaw;
 use super::quad::{Quad, direction};
+use super::recursion::BaseJoint;
 use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
@@ -49,6 +50,11 @@ impl PlanarEngine {
             quad.inertia_at_reference = quad.inertia_at_reference * hold;
             quad.motion = Default::default();
         }
+        let base_joint = self.base_joint;
+        if let BaseJoint::Curved { ahead, share, .. } = &mut self.base_joint {
+            // Displacements for velocities.
+            (*ahead, *share) = (1.0, 1.0);
+        }
         self.velocity = [0.0; 2];
         self.finite = false;
         let settled = dispatch!(self.level, simd => self.settle_in_steps(simd, &dynamic));
@@ -56,6 +62,7 @@ impl PlanarEngine {
             (quad.mass, quad.inertia, quad.implicit) = (real.mass, real.inertia, real.implicit);
             quad.inertia_at_reference = real.inertia_at_reference;
         }
+        self.base_joint = base_joint;
         self.floor.swap_cones(&mut cones);
         self.floor.clear();
         match settled? {

@@ -159,13 +159,16 @@ pub(super) fn weight_of(damping: f64, time_step: f64) -> f64 {
 }
 
 /// Sets what springs and dampers add to the joints' articulated inertia in a step of `time_step` (s).
-pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: BaseJoint, weight: f64, time_step: f64) {
+pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: &mut BaseJoint, weight: f64, time_step: f64) {
     let implicit = Lanes::splat(weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step));
     for quad in quads.iter_mut() {
         quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
     }
+    if let BaseJoint::Curved { damping_time, ahead, share, .. } = base_joint {
+        (*ahead, *share) = (*damping_time + 0.5 * time_step, weight * time_step);
+    }
     if let BaseJoint::Hinged { damping_time } = base_joint {
         let stiffness = quads[0].stiffness.lane(0);
-        quads[0].implicit.set_lane(0, weight * time_step * stiffness * (damping_time + 0.5 * time_step));
+        quads[0].implicit.set_lane(0, weight * time_step * stiffness * (*damping_time + 0.5 * time_step));
     }
 }
