@@ -368,7 +368,14 @@ fn free_forms_hold_the_named_laws_of_their_places() {
     ];
     let soft = |c: f64| [1, 2, 3, 4].map(|k| (COMPLIANCES[k - 1], c));
     let [s1, s2, s3, s4] = soft(0.7);
-    let cases: [(Effects, Effects); 12] = [
+    let cases: [(Effects, Effects); 13] = [
+        (
+            &[(
+                "free-stiffness-along",
+                &[("change_1", 0.2), ("change_2", 0.2), ("change_3", 0.2), ("change_4", 0.2), ("change_5", 0.2)],
+            )],
+            &[("stiffness", &[("scale", 1.2)])],
+        ),
         (&[("free-clamp", &[s1, s2, s3, s4])], &[("clamp-compliance", &[("compliance_rad_per_n_m", 0.7)])]),
         (
             &[("free-clamp", &[s1, s2, s3, s4, ("damping_s", 3e-3), ("range_mn_m", 1.0)])],
@@ -428,6 +435,27 @@ fn a_clamp_of_any_curve_turns_by_the_compliance_up_to_its_moment() {
         let turn: f64 = (0..parts).map(|k| 1e-7 * at(f64::from(k) + 0.5) * moment / f64::from(parts)).sum();
         // The turn lowers the tip by the length times it; the sag shortens the lever. Seen: 9e-4.
         assert!(((soft - stiff) / (-10.0 * turn) - 1.0).abs() < 3e-3, "{compliances:?}: {stiff} {soft} {turn}");
+    }
+}
+
+#[test]
+fn a_soft_part_of_the_robot_sags_as_the_beam_says_with_any_number_of_joints() {
+    // The deflection of the tip by the part from a to b of a cantilever that is softer there by the factor 1/(1 + s):
+    // Δw = (1/(1 + s) − 1)·∫ M(x)·(L − x)/B dx, M = p·(L − x)²/2, against p·L⁴/8B of the whole, with u = (L − x)/L: (1/(1 + s) − 1)·(u_a⁴ − u_b⁴).
+    let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01"];
+    let soft = -0.3;
+    for (part, name) in ["change_1", "change_2", "change_3", "change_4", "change_5"].into_iter().enumerate() {
+        for joints in [20, 33] {
+            let joints = format!("robot.motors_per_actuator={joints}");
+            let settings: Vec<&str> = rest.into_iter().chain([joints.as_str()]).collect();
+            let plain = tip(&run(CANTILEVER, &settings));
+            let softer = tip(&run(&with(CANTILEVER, "free-stiffness-along", &[(name, soft)]), &settings));
+            let u = |k: usize| (1.0 - 0.2 * k as f64).powi(4);
+            let expected = (1.0 / (1.0 + soft) - 1.0) * (u(part) - u(part + 1));
+            let found = softer / plain - 1.0;
+            eprintln!("{part} {joints} {found} {expected} {}", found - expected);
+            assert!((found - expected).abs() < 5e-3 * (1.0 / (1.0 + soft) - 1.0), "{name}, {joints}: {found}, not {expected}");
+        }
     }
 }
 

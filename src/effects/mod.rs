@@ -153,6 +153,7 @@ pub static EFFECTS: &[&Effect] = &[
     &structure::FREE_MOMENT_OF_RATE,
     &structure::FREE_JOINT_MEMORY,
     &structure::FREE_JOINT_SLIP,
+    &structure::FREE_STIFFNESS_ALONG,
     &structure::FREE_MASS,
     &structure::FREE_DRAG,
     &driver::TIME_DELAY,

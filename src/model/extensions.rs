@@ -30,6 +30,8 @@ pub struct Extensions {
     pub rest_curvature: Vec<f64>,
     /// Factor on each joint's voltage (–), or none.
     pub joint_gains: Vec<f64>,
+    /// Factor on each joint's stiffness (–), or none.
+    pub joint_stiffness: Vec<f64>,
     /// a of `k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p)` (cm²), with κ₀ = `SOFTENING_CURVATURE`.
     pub softening: f64,
     /// p of the same; 2 is the cubic law.
@@ -110,6 +112,7 @@ impl Default for Extensions {
             point_masses: Vec::new(),
             rest_curvature: Vec::new(),
             joint_gains: Vec::new(),
+            joint_stiffness: Vec::new(),
             softening: 0.0,
             softening_exponent: 2.0,
             dry_friction: 0.0,

@@ -62,6 +62,8 @@ mod state;
 mod statics;
 mod step;
 
+use std::cmp::Ordering;
+
 use fearless_simd::Level;
 use wide::f64x2;
 
@@ -294,7 +296,14 @@ fn bodies_in_quads(
         at.inertia.set_lane(lane, bodies[i].inertia);
         at.middle.set_lane(lane, if i < root { 1.0 - bodies[i].middle } else { bodies[i].middle });
         at.reach.set_lane(lane, if i < root { -segment.length } else { segment.length });
-        at.stiffness.set_lane(lane, joint.stiffness);
+        // Of the joint at the body's reference point; the root has none.
+        let own = match i.cmp(&root) {
+            Ordering::Less => Some(i),
+            Ordering::Equal => None,
+            Ordering::Greater => Some(i - 1),
+        };
+        let factor = own.and_then(|own| robot.extensions.joint_stiffness.get(own)).copied().unwrap_or(1.0);
+        at.stiffness.set_lane(lane, joint.stiffness * factor);
         frictions[2 * quad + lane / 2][lane % 2] = (segment.friction * robot.friction.ground).min(LARGEST_FRICTION);
     }
     for quad in &mut quads {

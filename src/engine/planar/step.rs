@@ -160,8 +160,9 @@ pub(super) fn weight_of(damping: f64, time_step: f64) -> f64 {
 
 /// Sets what springs and dampers add to the joints' articulated inertia in a step of `time_step` (s).
 pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: &mut BaseJoint, weight: f64, time_step: f64) {
-    let implicit = Lanes::splat(weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step));
+    let [share, lag] = [weight * time_step, joint.damping_time + 0.5 * time_step].map(Lanes::splat);
     for quad in quads.iter_mut() {
+        let implicit = share * quad.stiffness * lag;
         quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
     }
     if let BaseJoint::Curved { damping_time, ahead, share, .. } = base_joint {
