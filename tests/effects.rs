@@ -460,6 +460,47 @@ fn a_soft_part_of_the_robot_sags_as_the_beam_says_with_any_number_of_joints() {
 }
 
 #[test]
+fn a_free_picture_holds_scale_offset_and_tilt_and_adds_its_second_order() {
+    let (sin, cos) = 3.0_f64.to_radians().sin_cos();
+    let cases: [(&[(&str, f64)], &str, &[(&str, f64)]); 3] = [
+        (&[("x_of_x", 0.04), ("z_of_z", 0.04)], "sensor-scale", &[("scale", 1.04)]),
+        (&[("x_offset_mm", 0.7), ("z_offset_mm", -1.3)], "sensor-offset", &[("x_mm", 0.7), ("z_mm", -1.3)]),
+        (
+            &[("x_of_x", cos - 1.0), ("x_of_z", -sin), ("z_of_x", sin), ("z_of_z", cos - 1.0)],
+            "camera-tilt",
+            &[("angle_deg", 3.0)],
+        ),
+    ];
+    let plain = run(CANTILEVER, &[]).recording;
+    for (free, id, named) in cases {
+        let [free, named] =
+            [("free-picture", free), (id, named)].map(|(id, values)| run(&with(CANTILEVER, id, values), &[]).recording);
+        // Two ways to the same numbers, of at most 10 cm: rounding only.
+        let pairs = free.positions.iter().zip(&named.positions);
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-14 * 10.0), "{id}");
+        assert!(free.positions != plain.positions, "{id}");
+    }
+    let bent = [
+        ("range_mm", 50.0),
+        ("x_of_xx", 0.01),
+        ("x_of_xz", 0.02),
+        ("x_of_zz", -0.03),
+        ("z_of_xx", -0.04),
+        ("z_of_xz", 0.05),
+        ("z_of_zz", 0.06),
+    ];
+    let bent = run(&with(CANTILEVER, "free-picture", &bent), &[]).recording;
+    for record in 0..plain.len() {
+        for node in 0..plain.nodes() {
+            let ([x, _, z], seen) = (plain.node(record, node), bent.node(record, node));
+            let of = |a: f64, b: f64, c: f64| (a * x * x + b * x * z + c * z * z) / 5.0;
+            let expected = [x + of(0.01, 0.02, -0.03), z + of(-0.04, 0.05, 0.06)];
+            assert!((seen[0] - expected[0]).abs() < 1e-13 && (seen[2] - expected[1]).abs() < 1e-13, "{record} {node}");
+        }
+    }
+}
+
+#[test]
 fn the_clamps_curve_is_linear_in_its_weights_near_a_rigid_clamp() {
     // Positions change by the sum of what single weights change, up to the square of the weights: what a screening from zero relies on.
     let plain = run(CANTILEVER, &[]).recording.positions;

@@ -23,11 +23,16 @@ pub(super) struct Visited {
     pub(super) rate: f64,
     /// Largest moment on the root of the nominal robot (mN·m).
     pub(super) root_moment: f64,
+    /// Largest measured coordinate (mm).
+    pub(super) coordinate: f64,
+    /// Whether x and z are measured.
+    pub(super) axes: [bool; 2],
 }
 
 impl Visited {
     /// Nothing: without free forms.
-    pub(super) const NOTHING: Self = Self { volts: [0.0; 2], curvature: LEAST, rate: LEAST, root_moment: LEAST };
+    pub(super) const NOTHING: Self =
+        Self { volts: [0.0; 2], curvature: LEAST, rate: LEAST, root_moment: LEAST, coordinate: 1.0, axes: [true; 2] };
 
     /// The range of a free form by the name of its parameter; none of other parameters.
     pub(super) fn given(&self, name: &str) -> Option<f64> {
@@ -38,14 +43,20 @@ impl Visited {
             "low_per_m" => Some(-self.curvature),
             "high_per_m" | "range_per_m" => Some(self.curvature),
             "range_per_m_s" => Some(self.rate),
+            "range_mm" => Some(self.coordinate),
             "range_mn_m" => Some(self.root_moment),
             _ => None,
         }
     }
 
-    /// True if the data do not reach the side of a curve that the parameter `name` belongs to.
+    /// True if the data do not reach the side of a curve that the parameter `name` belongs to, or do not show the axis.
     pub(super) fn is_beyond(&self, effect: &Effect, name: &str) -> bool {
         let has = |range: &str| effect.parameters.iter().any(|p| p.name == range);
+        let is_of_picture = has("x_of_z");
+        let is_unseen = |axis: usize, prefix: &str| is_of_picture && !self.axes[axis] && name.starts_with(prefix);
+        if is_unseen(0, "x_") || is_unseen(1, "z_") {
+            return true;
+        }
         has("low_v")
             && ((name.starts_with("below") && self.volts[0] == 0.0) || (name.starts_with("above") && self.volts[1] == 0.0))
     }
@@ -78,7 +89,7 @@ pub(super) fn visited(runs: &[Visit]) -> Result<Visited, EngineError> {
         most = [0, 1, 2].map(|k| f64::max(most[k], in_units[k] * of_run[k]));
     }
     let [curvature, rate, root_moment] = most;
-    Ok(Visited { volts, curvature, rate, root_moment })
+    Ok(Visited { volts, curvature, rate, root_moment, ..Visited::NOTHING })
 }
 
 /// Largest elastic curvature of a joint (1/cm), largest rate of curvature (1/(cm·s)) and largest moment on the root (dyn·cm) in a run.

@@ -179,6 +179,7 @@ pub static EFFECTS: &[&Effect] = &[
     &measurement::SENSOR_OFFSET,
     &measurement::SENSOR_DELAY,
     &measurement::CAMERA_TILT,
+    &measurement::FREE_PICTURE,
 ];
 
 /// The effect with an id; none if there is none.
