@@ -90,8 +90,15 @@ mod tests {
     use crate::effects::Place;
 
     const BENCH: Bench = Bench { is_clamped: true, is_on_floor: true, actuators: 5, markers: 3 };
-    const VISITED: Visited =
-        Visited { volts: [-1500.0, 400.0], curvature: 5.0, rate: 300.0, root_moment: 3.0, coordinate: 50.0, axes: [true; 2] };
+    const VISITED: Visited = Visited {
+        volts: [-1500.0, 400.0],
+        curvature: 5.0,
+        rate: 300.0,
+        root_moment: 3.0,
+        slip_speed: 100.0,
+        coordinate: 50.0,
+        axes: [true; 2],
+    };
 
     #[test]
     fn every_effect_is_a_candidate_or_excluded_for_a_reason() {

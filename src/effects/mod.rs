@@ -173,6 +173,7 @@ pub static EFFECTS: &[&Effect] = &[
     &actuation::PASSIVE_MARGIN,
     &ground::GROUND_FRICTION,
     &ground::STICK_SLIP,
+    &ground::FREE_FLOOR_FRICTION,
     &ground::CONTACT_RESTITUTION,
     &ground::GROUND_SLOPE,
     &measurement::SENSOR_SCALE,

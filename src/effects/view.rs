@@ -38,6 +38,11 @@ impl View {
         *self == Self::default()
     }
 
+    /// True if the view does not depend on where x = 0 is.
+    pub fn only_shifts(&self) -> bool {
+        self.scale == 1.0 && self.tilt == 0.0 && self.distortion == [[0.0; 6]; 2]
+    }
+
     /// The recorded position (cm) of a point at x, z (cm): rolled, scaled, shifted, then bent.
     pub fn of(&self, [x, z]: [f64; 2]) -> [f64; 2] {
         let [x, z] = if self.tilt == 0.0 {

@@ -2,6 +2,7 @@
 
 use super::clamp::ClampCurve;
 use super::curve::Curve;
+use super::friction::FrictionCurve;
 
 /// Additions to the plain robot that both engines know how to step. [`crate::effects`] sets them; the fields are in CGS units.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +57,8 @@ pub struct Extensions {
     pub restitution: f64,
     /// How friction depends on the sliding speed.
     pub stick_slip: StickSlip,
+    /// Change of the coefficient of friction with the sliding speed, beside `stick_slip`.
+    pub friction_of_speed: FrictionCurve,
 }
 
 /// A spring that slips at a moment: friction that begins with elastic presliding (Jenkins's element; Iwan 1966).
@@ -125,6 +128,7 @@ impl Default for Extensions {
             slope: 0.0,
             restitution: 0.0,
             stick_slip: StickSlip::OFF,
+            friction_of_speed: FrictionCurve::OFF,
         }
     }
 }
@@ -163,6 +167,11 @@ impl Extensions {
             || !self.slips.is_empty()
             || !self.moment_of_curvature.is_zero()
             || !self.moment_of_rate.is_zero()
+    }
+
+    /// Whether friction depends on the sliding speed.
+    pub fn has_friction_of_speed(&self) -> bool {
+        self.stick_slip != StickSlip::OFF || !self.friction_of_speed.is_off()
     }
 
     /// Whether joints have a Maxwell chain.

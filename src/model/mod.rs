@@ -15,6 +15,7 @@ mod builder;
 mod clamp;
 mod curve;
 mod extensions;
+mod friction;
 mod laminate;
 mod robot;
 pub mod units;
@@ -25,6 +26,7 @@ pub use extensions::{
     AIR_DENSITY, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, Slip, StickSlip,
     VISCOUS_REACH,
 };
+pub use friction::{FRICTION_POINTS, FrictionCurve};
 pub use laminate::{Laminate, Material};
 pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment, box_inertia};
 
