@@ -463,7 +463,8 @@ fn a_soft_part_of_the_robot_sags_as_the_beam_says_with_any_number_of_joints() {
 #[test]
 fn a_free_picture_holds_scale_offset_and_tilt_and_adds_its_second_order() {
     let (sin, cos) = 3.0_f64.to_radians().sin_cos();
-    let cases: [(&[(&str, f64)], &str, &[(&str, f64)]); 3] = [
+    type Values<'a> = &'a [(&'a str, f64)];
+    let cases: [(Values, &str, Values); 3] = [
         (&[("x_of_x", 0.04), ("z_of_z", 0.04)], "sensor-scale", &[("scale", 1.04)]),
         (&[("x_offset_mm", 0.7), ("z_offset_mm", -1.3)], "sensor-offset", &[("x_mm", 0.7), ("z_mm", -1.3)]),
         (
@@ -500,6 +501,57 @@ fn a_free_picture_holds_scale_offset_and_tilt_and_adds_its_second_order() {
             let expected = [x + of(0.01, 0.02, -0.03), z + of(-0.04, 0.05, 0.06)];
             assert!((seen[0] - expected[0]).abs() < 1e-13 && (seen[2] - expected[1]).abs() < 1e-13, "{record} {node}");
         }
+    }
+}
+
+#[test]
+fn a_list_is_the_numbered_keys_in_their_order() {
+    let lists = format!(
+        "{CANTILEVER}\n[[effect]]\nid = \"free-moment-of-deviation\"\nbelow_mn_m = [0.1, 0.2, 0.3, 0.2, 1]\nabove_2_mn_m = 0.4\n\
+         [[effect]]\nid = \"free-mass\"\nmass_g = [0, 0.1, 0.0, 0.2]\n"
+    );
+    let keys = with(
+        CANTILEVER,
+        "free-moment-of-deviation",
+        &[
+            ("below_1_mn_m", 0.1),
+            ("below_2_mn_m", 0.2),
+            ("below_3_mn_m", 0.3),
+            ("below_4_mn_m", 0.2),
+            ("below_5_mn_m", 1.0),
+            ("above_2_mn_m", 0.4),
+        ],
+    );
+    let keys = with(&keys, "free-mass", &[("mass_2_g", 0.1), ("mass_4_g", 0.2)]);
+    assert_eq!(run(&lists, &[]).recording, run(&keys, &[]).recording);
+    assert_ne!(run(&lists, &[]).recording, run(CANTILEVER, &[]).recording);
+}
+
+#[test]
+fn a_list_that_does_not_fit_is_refused_with_line_and_key() {
+    for (id, line, words) in [
+        ("free-mass", "mass_g = [0.1, 0.2]", "mass_g has 2 numbers, but stands for 4: mass_1_g to mass_4_g"),
+        ("free-mass", "mass_g = []", "mass_g has 0 numbers"),
+        ("free-mass", "mass_g = 0.1", "mass_g takes a list of 4 numbers"),
+        ("free-mass", "mass_g = [0.1, \"x\", 0.2, 0.3]", "takes numbers"),
+        ("free-mass", "mass_g = [[0.1], 0, 0, 0]", "takes numbers"),
+        ("free-mass", "mass_1_g = [0.1]", "mass_1_g takes one number, not a list"),
+        ("tip-mass", "mass_g = [0.1]", "mass_g takes one number, not a list"),
+        ("tip-mass", "mass_g = \"0.1\"", "takes numbers"),
+        ("tip-mass", "mass_g = true", "takes numbers"),
+        ("free-mass", "mass_2_g = 0.1\nmass_g = [0, 0, 0, 0]", "mass_2_g is given by its own key and in mass_g"),
+    ] {
+        let text = format!("{CANTILEVER}[[effect]]\nid = \"{id}\"\n{line}\n");
+        let at = text.lines().position(|of| of == line.lines().next().unwrap()).unwrap() + 1;
+        let key = line.split(' ').next().unwrap();
+        let error = experiment::experiment(&Source::from_text("x.toml", text)).unwrap_err().to_string();
+        let place = format!("x.toml, line {at}: effect.0.{key}: ");
+        assert!(error.starts_with(&place) && error.contains(words), "{line}: {error}");
+    }
+    for (line, words) in [("mass_g = [0, 0, 0, 9]", "mass_4_g is 9"), ("moment_mn_m = [1, 2]", "no parameter \"moment_mn_m\"")] {
+        let text = format!("{CANTILEVER}[[effect]]\nid = \"free-mass\"\n{line}\n");
+        let error = experiment::experiment(&Source::from_text("x.toml", text)).unwrap_err().to_string();
+        assert!(error.contains("x.toml, line ") && error.contains(words), "{line}: {error}");
     }
 }
 

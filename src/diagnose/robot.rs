@@ -185,7 +185,7 @@ impl RobotPlant {
         self
     }
 
-    /// The largest measured coordinate (mm), and whether x and z are measured. A frequency response has no positions, only an axis.
+    /// The largest coordinate of a marker (mm), measured or on the flat robot, and whether x and z are measured. A frequency response has no positions, only an axis.
     fn seen(&self) -> (f64, [bool; 2]) {
         let (mut coordinate, mut axes) = (0.0_f64, [false; 2]);
         for (run, signal) in self.runs.iter().zip(&self.signals) {
@@ -198,7 +198,8 @@ impl RobotPlant {
                 coordinate = coordinate.max(value.abs());
             }
         }
-        (if coordinate > 0.0 { coordinate } else { Visited::NOTHING.coordinate }, axes)
+        // Where a place is not measured, or badly, it is that of the flat robot.
+        (self.markers.iter().fold(coordinate, |most, position| most.max(10.0 * position)), axes)
     }
 
     /// Sets each run's time step to the longest that keeps its prediction within [`LARGEST_CHANGE`].

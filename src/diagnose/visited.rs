@@ -25,7 +25,7 @@ pub(super) struct Visited {
     pub(super) root_moment: f64,
     /// Largest slip speed on the floor of the nominal robot (mm/s).
     pub(super) slip_speed: f64,
-    /// Largest measured coordinate (mm).
+    /// Largest coordinate of a marker (mm).
     pub(super) coordinate: f64,
     /// Whether x and z are measured.
     pub(super) axes: [bool; 2],

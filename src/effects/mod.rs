@@ -12,6 +12,7 @@ mod curve;
 mod driver;
 mod fitting;
 mod ground;
+mod groups;
 mod measurement;
 mod numerics;
 mod signal_chain;
@@ -19,6 +20,7 @@ mod structure;
 mod view;
 
 pub use fitting::{Bench, Fitting, Form, Place, Shape, fits};
+pub use groups::Given;
 pub use signal_chain::{SignalChain, SignalStage};
 pub use view::View;
 
@@ -212,6 +214,50 @@ pub enum EffectError {
         id: &'static str,
         /// The parameter.
         name: &'static str,
+    },
+    /// A list of another length than the group of parameters that it stands for.
+    #[error("effect {id}: {name} has {given} numbers, but stands for {needed}: {first} to {last}")]
+    Length {
+        /// The effect.
+        id: &'static str,
+        /// The key of the list.
+        name: String,
+        /// Length of the list.
+        given: usize,
+        /// Number of parameters.
+        needed: usize,
+        /// The first of them.
+        first: &'static str,
+        /// The last of them.
+        last: &'static str,
+    },
+    /// A list for a key that takes one number.
+    #[error("effect {id}: {name} takes one number, not a list")]
+    OneNumber {
+        /// The effect.
+        id: &'static str,
+        /// The key.
+        name: String,
+    },
+    /// One number for a key that takes a list.
+    #[error("effect {id}: {name} takes a list of {needed} numbers")]
+    List {
+        /// The effect.
+        id: &'static str,
+        /// The key.
+        name: String,
+        /// Number of parameters.
+        needed: usize,
+    },
+    /// A parameter that is given by its own key and in a list.
+    #[error("effect {id}: {name} is given by its own key and in {list}; keep one of the two")]
+    Twice {
+        /// The effect.
+        id: &'static str,
+        /// The parameter.
+        name: &'static str,
+        /// The key of the list.
+        list: String,
     },
     /// A value out of range.
     #[error("effect {id}: {name} is {}, but must lie between {} and {}", number(*.value), number(*.low), number(*.high))]
