@@ -196,11 +196,13 @@ fn row(key: &Key) -> String {
 /// Which keys take lists.
 fn lists_of_effects() -> String {
     let mut text = String::from(
-        "\nNumbered keys may be given together, as a list under the key without the number, in the order of the numbers:\n\n| `id` | key of the list | numbers |\n| --- | --- | --- |\n",
+        "\nNumbered keys may be given together, as a list under the key without the number, in the order of the numbers:\n\n",
     );
     for effect in EFFECTS {
-        for (key, names) in effect.groups() {
-            text += &format!("| `{}` | `{key}` | {} |\n", effect.id, names.len());
+        let of = |(key, names): &(String, Vec<&str>)| format!("`{key}` ({} numbers)", names.len());
+        let lists: Vec<String> = effect.groups().iter().map(of).collect();
+        if !lists.is_empty() {
+            text += &format!("- `{}`: {}\n", effect.id, lists.join(", "));
         }
     }
     text
