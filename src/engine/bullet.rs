@@ -8,7 +8,8 @@
 //!   the state at the step's start, an error of first order in the step. Only the Prony chains have a memory; it is part of saved states.
 //! - A point mass changes mass, centre of mass and inertia of the body it is fixed to, exactly. Records stay those of the boxes.
 //! - A compliant clamp is a spring at the left end, in the constraint that holds the base. It is implicit, so any compliance is stable at any step; its
-//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step.
+//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step. One whose turn is a curve of the moment
+//!   is linearised there at the step's start, a further error of first order.
 //! - Restitution is Bullet's, with its threshold of 0.2 cm/s, without the push-out of the overlap that Bullet adds. The approach speed includes what the
 //!   step's forces add, so a foot that the actuators press down by more than 0.2 cm/s per step trembles; the planar engine takes the speed at the step's start.
 
