@@ -36,6 +36,16 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
+/// What judges the models: the runs behind every figure of a gain and of a held-out error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JudgedBy {
+    /// Runs that neither fit nor selection saw.
+    JudgeRuns,
+    /// Each run in turn, left out of selection and fit: there are too few runs to keep some.
+    CrossValidation,
+}
+
 /// What an adopted cause counts for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -113,7 +123,7 @@ pub struct Nearest {
 pub struct RunError {
     /// The run.
     pub id: String,
-    /// `fit` or `held-out`.
+    /// `fit`, `select` or `judge`.
     pub role: &'static str,
     /// Root mean square residual (mm).
     pub rmse_mm: f64,
@@ -215,6 +225,8 @@ pub struct Diagnosis {
     pub noise_correlated: f64,
     /// Its correlation time (s); 0 for white noise.
     pub noise_correlation_time_s: f64,
+    /// What judges the models: behind `gain_heldout` and `rmse_heldout_mm`; none of single numbers.
+    pub judged_by: Option<JudgedBy>,
     /// Faults of the bench that differ from run to run, as far as the data ask for them.
     pub bench: Vec<BenchFault>,
     /// The nominal model.

@@ -133,9 +133,9 @@ fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
 fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
     let channels = plant.channels();
     let head = ["run", "role", "channel", "t_s", "measured_mm", "nominal_mm", "calibrated_mm", "extended_mm", "used"];
-    let rows = outcome.split.all().into_iter().flat_map(|run| {
+    let rows = (0..plant.signals().len()).flat_map(|run| {
         let signal = &plant.signals()[run];
-        let role = if outcome.split.held.contains(&run) { "held-out" } else { "fit" };
+        let role = outcome.split.role(run);
         let channels = &channels;
         (0..signal.values.len()).map(move |i| {
             let used = outcome.used[run][i];

@@ -266,15 +266,20 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn plain_residuals(&self, model: &Model) -> Result<Vec<Residuals>, DiagnoseError> {
-        let of = |run: usize| {
-            let nuisance = self.nuisance(model, run);
-            let mut residuals = self.plain(model, run, &nuisance)?;
-            if let Some(columns) = self.faults.get(run) {
-                columns.take_from(&model.spread, &self.misfit(model, run, &nuisance)?, &mut residuals);
-            }
-            Ok(residuals)
-        };
-        (0..self.plant.signals().len()).into_par_iter().map(of).collect()
+        (0..self.plant.signals().len()).into_par_iter().map(|run| self.plain_residuals_of(model, run)).collect()
+    }
+
+    /// [`plain_residuals`](Self::plain_residuals) of one run.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn plain_residuals_of(&self, model: &Model, run: usize) -> Result<Residuals, DiagnoseError> {
+        let nuisance = self.nuisance(model, run);
+        let mut residuals = self.plain(model, run, &nuisance)?;
+        if let Some(columns) = self.faults.get(run) {
+            columns.take_from(&model.spread, &self.misfit(model, run, &nuisance)?, &mut residuals);
+        }
+        Ok(residuals)
     }
 
     /// Residuals of several runs, in σ.

@@ -11,8 +11,10 @@
 //! Mech. Syst. Signal Process. 20 (2006) 505; J. Brynjarsdóttir and A. O'Hagan, "Learning about physical parameters: the importance of model
 //! discrepancy", Inverse Problems 30 (2014) 114007.
 
+mod adopted;
 pub mod bench;
 mod candidates;
+mod causes;
 pub mod combinations;
 mod curve;
 pub mod dataset;
@@ -42,9 +44,13 @@ mod response;
 pub mod robot;
 mod run_csv;
 pub mod search;
+pub mod split;
 mod stability;
 mod summary;
+mod ties;
 mod track;
+mod unseen;
+mod verdict;
 mod visited;
 pub mod voltage;
 

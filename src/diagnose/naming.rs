@@ -160,8 +160,8 @@ impl<'a> Place<'a> {
     fn taken(&self, scored: &Scored) -> f64 {
         let count = |runs: &[usize]| self.search.estimator.count(runs).max(1) as f64;
         let whole = (self.bare.total() - self.best.total()) / count(&self.search.split.all());
-        let held = (self.bare.held - self.best.held) / count(&self.search.split.held);
-        let of = |scored: &Scored| if held > LEAST_SHOWN * whole { scored.held } else { scored.total() };
+        let held = (self.bare.select - self.best.select) / count(&self.search.split.select);
+        let of = |scored: &Scored| if held > LEAST_SHOWN * whole { scored.select } else { scored.total() };
         (of(&self.bare) - of(scored)) / (of(&self.bare) - of(&self.best)).max(f64::MIN_POSITIVE)
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::diagnosis::{Diagnosis, Part, Stage, Verdict};
+use super::diagnosis::{Diagnosis, JudgedBy, Part, Stage, Verdict};
 use super::fit::sum_of_squares;
 use super::names;
 use super::picture;
@@ -67,11 +67,16 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
     let mut out = heading(d);
     let _ = writeln!(
         out,
-        "<p class=\"small\">Noise {} {unit}; of the misfit above it {} % is left. Models were fitted to {} runs and judged on {} others.</p>",
+        "<p class=\"small\">Noise {} {unit}; of the misfit above it {} % is left. Models were fitted to {} runs, causes were selected on {} \
+         others, and the result is judged {}.</p>",
         significant(d.noise_mm, 3),
         fixed(100.0 * d.unexplained_fraction, 1),
         outcome.split.fit.len(),
-        outcome.split.held.len()
+        outcome.split.select.len(),
+        match d.judged_by {
+            Some(JudgedBy::JudgeRuns) => format!("on {} that neither saw", outcome.split.judge.len()),
+            _ => "by nested cross-validation".into(),
+        }
     );
     for line in &d.unexplained {
         let _ = writeln!(out, "<p class=\"bad\">What is left: {}</p>", prose(line));
@@ -147,7 +152,7 @@ fn curves(out: &mut String, d: &Diagnosis) {
 
 fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
     let digits = digits_for(d.noise_mm.max(1e-5)) + 1;
-    out.push_str("<h2>The gain, on runs that no fit saw</h2>\n");
+    out.push_str("<h2>The gain, on runs that neither fit nor selection saw</h2>\n");
     let error = format!("#held-out error ({unit})");
     let mut table = Table::new(&["model", &error, "#95 % range", &format!("#all runs ({unit})")]);
     for (name, stage) in [("nominal", &d.baseline), ("re-tuned constants", &d.calibrated), ("extended", &d.extended)] {

@@ -9,10 +9,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::dataset::Role;
 use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, sum_of_squares};
 use super::noise;
-use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
+use super::plant::{Candidate, Free, Model, Term};
+use super::split::Split;
 
 /// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
@@ -50,24 +50,6 @@ const MOST_SPREADS: usize = 3;
 /// Most causes in addition to the constants.
 const MOST_CAUSES: usize = 6;
 
-/// Fit and held-out runs, by index.
-#[derive(Debug, Clone)]
-pub struct Split {
-    /// Runs to which parameters are fitted.
-    pub fit: Vec<usize>,
-    /// Runs on which models are judged.
-    pub held: Vec<usize>,
-}
-
-impl Split {
-    /// All runs in order.
-    pub fn all(&self) -> Vec<usize> {
-        let mut all = [self.fit.as_slice(), &self.held].concat();
-        all.sort_unstable();
-        all
-    }
-}
-
 /// A fitted model with its residuals on all runs.
 #[derive(Debug, Clone)]
 pub struct Scored {
@@ -79,8 +61,8 @@ pub struct Scored {
     pub plain: Vec<Residuals>,
     /// What the spread of the bench's faults costs in each run (log det of [`bench`](super::bench)).
     pub spread_costs: Vec<f64>,
-    /// Cost of the held-out runs: χ² and that of the spread.
-    pub held: f64,
+    /// Cost of the runs that are selected on: χ² and that of the spread.
+    pub select: f64,
     /// Cost of the fit runs.
     pub fitted: f64,
 }
@@ -88,13 +70,7 @@ pub struct Scored {
 impl Scored {
     /// Cost of all runs.
     pub fn total(&self) -> f64 {
-        self.held + self.fitted
-    }
-
-    /// χ² per value above 1, for `count` values in all runs.
-    pub(super) fn above(&self, count: usize) -> f64 {
-        let chi2: f64 = self.residuals.iter().map(|r| sum_of_squares(r)).sum();
-        (chi2 / count as f64 - 1.0).max(0.0)
+        self.select + self.fitted
     }
 
     /// The model.
@@ -156,6 +132,16 @@ impl Search<'_> {
         self.estimator.plant.candidates()[candidate].id
     }
 
+    /// χ² of the runs that the search sees, without the cost of the spread.
+    pub(super) fn chi2(&self, scored: &Scored) -> f64 {
+        self.split.all().iter().map(|run| sum_of_squares(&scored.residuals[*run])).sum()
+    }
+
+    /// χ² per value above 1.
+    pub(super) fn above(&self, scored: &Scored) -> f64 {
+        (self.chi2(scored) / self.estimator.count(&self.split.all()) as f64 - 1.0).max(0.0)
+    }
+
     /// Cost of a model on all runs, with ln N for each coordinate.
     pub fn cost(&self, scored: &Scored) -> f64 {
         scored.total() + scored.freedom() as f64 * (self.estimator.count(&self.split.all()) as f64).ln()
@@ -176,13 +162,25 @@ impl Search<'_> {
         let (residuals, spread_costs): (Vec<_>, Vec<_>) = self.estimator.costs_of(&fit.model, &all)?.into_iter().unzip();
         let sum = |runs: &[usize]| runs.iter().map(|run| sum_of_squares(&residuals[*run]) + spread_costs[*run]).sum();
         Ok(Scored {
-            held: sum(&self.split.held),
+            select: sum(&self.split.select),
             fitted: sum(&self.split.fit),
             plain: self.estimator.plain_residuals(&fit.model)?,
             fit,
             residuals,
             spread_costs,
         })
+    }
+
+    /// A scored model with its residuals on the runs that judge, under their present nuisance parameters.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn with_judged(&self, mut scored: Scored) -> Result<Scored, DiagnoseError> {
+        for run in &self.split.judge {
+            scored.residuals[*run] = self.estimator.residuals(&scored.fit.model, *run)?;
+            scored.plain[*run] = self.estimator.plain_residuals_of(&scored.fit.model, *run)?;
+        }
+        Ok(scored)
     }
 
     /// Fits a model and scores it.
@@ -273,7 +271,7 @@ impl Search<'_> {
 
     /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
-        let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
+        let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
         let (_, gain) = self.gap(more, less, runs);
         let count = self.estimator.count(runs) as f64;
         gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
@@ -286,7 +284,7 @@ impl Search<'_> {
 
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
     fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
-        let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
+        let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
         self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
     }
 
@@ -312,7 +310,9 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn measure_noise(&mut self, scored: &Scored) -> Result<bool, DiagnoseError> {
         let estimator = &mut self.estimator;
-        let Some(noise) = noise::estimate(estimator.plant.signals(), &estimator.used, &scored.plain) else { return Ok(false) };
+        let mut seen = estimator.used.clone();
+        self.split.judge.iter().for_each(|run| seen[*run].fill(false));
+        let Some(noise) = noise::estimate(estimator.plant.signals(), &seen, &scored.plain) else { return Ok(false) };
         if !noise.differs(&estimator.noise) {
             return Ok(false);
         }
@@ -447,22 +447,18 @@ impl Search<'_> {
         None
     }
 
-    /// The two screened causes that would lower χ² most together, if by more than twice what the best does alone: other pairs are found one cause
-    /// at a time.
-    fn pair(&self, base: &Model, screened: &Screened) -> Option<Model> {
-        let Screened { ranked, columns, rest, .. } = screened;
-        let mut least = 2.0 * ranked.first().map_or(0.0, |(gain, _)| *gain);
+    /// The two wanted causes of a screening that would lower χ² most together, if by more than `least`.
+    pub(super) fn pair(&self, base: &Model, screened: &Screened, least: f64, is_wanted: impl Fn(&Term) -> bool) -> Option<Model> {
+        let Screened { columns, rest, .. } = screened;
+        let is_law = |term: &Term| !self.candidate(term).is_free_form && !self.candidate(term).is_variant && is_wanted(term);
+        let columns: Vec<_> = columns.iter().filter(|(term, _)| is_law(term)).collect();
         let sizes: Vec<[f64; 2]> = columns.iter().map(|(_, u)| [u.norm_squared(), u.dot(rest)]).collect();
-        let mut pair = None;
+        let (mut least, mut pair) = (least, None);
         for (index, (first, u)) in columns.iter().enumerate() {
             for (other, (second, v)) in columns[..index].iter().enumerate() {
                 // Least squares of −rest on the two.
                 let ([uu, ur], [vv, vr], uv) = (sizes[index], sizes[other], u.dot(v));
                 let determinant = uu * vv - uv * uv;
-                let is_no_law = |term: &Term| self.candidate(term).is_free_form || self.candidate(term).is_variant;
-                if is_no_law(first) || is_no_law(second) {
-                    continue;
-                }
                 if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
                     continue;
                 }
@@ -544,7 +540,7 @@ impl Search<'_> {
 
     /// The criterion of ranking: χ² of the held-out runs, or BIC where there are none.
     pub fn judged(&self, scored: &Scored) -> f64 {
-        if self.split.held.is_empty() { scored.bic() } else { scored.held }
+        if self.split.select.is_empty() { scored.bic() } else { scored.select }
     }
 
     /// Forward selection: adds causes while they are worth it. Returns the last model and the first round's trials.
@@ -646,7 +642,7 @@ impl Search<'_> {
 
     /// χ² of the held-out runs, or of the fit runs where there are none.
     fn chi2_to_judge_by(&self, scored: &Scored) -> (f64, &[usize]) {
-        if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) }
+        if self.split.select.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.select, &self.split.select) }
     }
 
     /// The adoption of a model's last term, in words.
@@ -659,7 +655,9 @@ impl Search<'_> {
 
     /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.
     fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
-        let pair = self.pair(base.model(), screened)?;
+        // Other pairs are found one cause at a time.
+        let least = 2.0 * screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let pair = self.pair(base.model(), screened, least, |_| true)?;
         if let [.., first, second] = &pair.terms[..] {
             (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
         }
@@ -683,8 +681,8 @@ impl Search<'_> {
         (self.progress)(&format!("{} on another split", self.id(trial.candidate)));
         let before = self.split.clone();
         self.split.fit.retain(|other| *other != run);
-        self.split.held.push(run);
-        self.split.held.sort_unstable();
+        self.split.select.push(run);
+        self.split.select.sort_unstable();
         if let (Ok(plain), Ok(with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
             && self.is_worth(&with, &plain)
         {
@@ -753,7 +751,7 @@ impl Search<'_> {
         if is_constant { self.is_significant(more, less) } else { self.is_worth(more, less) }
     }
 
-    /// Replaces every cause by other candidates, `most` of each: the index of the term, and the trial.
+    /// Replaces every cause by other candidates, `most` of each: the candidate that is removed, and the trial.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
@@ -774,7 +772,7 @@ impl Search<'_> {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
                 if let Ok(scored) = self.ranked_beyond(&model, &screened) {
-                    found.push((index, Trial { candidate, scored }));
+                    found.push((removed.candidate, Trial { candidate, scored }));
                 }
             }
         }
@@ -888,81 +886,13 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Splits runs into fit and held-out ones; given roles are kept.
-///
-/// The others are split in the same way among runs with jumps of the input and among those without: in order of the input's speed, one of every
-/// three neighbours is held out, in turn the one with the largest and the one with the smallest range; the slowest and the fastest never are. Of two
-/// or three runs in all, the last or middle one is held out.
-pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
-    let signals = plant.signals();
-    let (mut fit, mut held) = (Vec::new(), Vec::new());
-    let mut kinds: [Vec<Pace>; 2] = [Vec::new(), Vec::new()];
-    for (run, signal) in signals.iter().enumerate() {
-        match roles.get(run).copied().unwrap_or_default() {
-            Role::Fit => fit.push(run),
-            Role::HeldOut => held.push(run),
-            Role::Auto => {
-                let pace = Pace::of(run, signal);
-                kinds[usize::from(pace.jumps)].push(pace);
-            }
-        }
-    }
-    for mut order in kinds {
-        order.sort_by(|a, b| a.speed.total_cmp(&b.speed).then(a.range.total_cmp(&b.range)));
-        let count = order.len();
-        let inner = if count < 3 { 0..0 } else { 1..count - 1 };
-        let mut out = Vec::new();
-        for (index, group) in order[inner].chunks(3).enumerate() {
-            let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
-            out.extend(group.iter().max_by(|a, b| (sign * a.range).total_cmp(&(sign * b.range))).map(|pace| pace.run));
-        }
-        for pace in order {
-            if out.contains(&pace.run) { held.push(pace.run) } else { fit.push(pace.run) }
-        }
-    }
-    fit.sort_unstable();
-    held.sort_unstable();
-    if fit.is_empty() {
-        std::mem::swap(&mut fit, &mut held);
-    }
-    if held.is_empty() && fit.len() >= 2 && roles.iter().all(|role| *role == Role::Auto) {
-        held.extend(fit.pop());
-    }
-    Split { fit, held }
-}
-
-/// Speed and range of a run's input.
-struct Pace {
-    run: usize,
-    /// Path of the input over its range, per second.
-    speed: f64,
-    /// Largest less smallest input.
-    range: f64,
-    /// True if the input jumps between two rows.
-    jumps: bool,
-}
-
-impl Pace {
-    fn of(run: usize, signal: &Signal) -> Self {
-        let (low, high) =
-            signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
-        let range = (high - low).max(1e-9);
-        let (mut path, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
-        for (u, t) in signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]) {
-            path += (u[1] - u[0]).abs();
-            largest = largest.max((u[1] - u[0]).abs());
-            time += t[1] - t[0];
-        }
-        let rows = signal.inputs.len().max(1) as f64;
-        // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
-        let jumps = largest > 6.0 * path / rows && largest > 0.05 * range;
-        Self { run, speed: path / range / f64::max(time, 1e-9), range, jumps }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::dataset::Role;
+    use crate::diagnose::plant::{Plant, Signal};
+    use crate::diagnose::split::split;
+
     /// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
     struct Waves {
         signals: Vec<Signal>,

@@ -281,6 +281,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         noise_mm: 0.0,
         noise_correlated: 0.0,
         noise_correlation_time_s: 0.0,
+        judged_by: None,
         bench: Vec::new(),
         baseline: stage(&nominal)?,
         calibrated: stage(best)?,

@@ -1,0 +1,216 @@
+//! Adopted causes: what each takes, how firmly it stands, what it is tied with, and what it counts for.
+
+use super::DiagnoseError;
+use super::causes::Causes;
+use super::curve::curve;
+use super::diagnosis::{Adopted, Estimate, Nearest, Part};
+use super::intervals::Intervals;
+use super::plant::{Model, Term};
+use super::search::{Scored, Search};
+use super::stability::{Standing, standing};
+use super::ties::{Ties, pair_in_place};
+use super::unseen::Unseen;
+use super::verdict::Judged;
+
+/// Causes are minor that together remove no more than this share, ...
+const MINOR_SHARE: f64 = 0.02;
+/// ... those that remove less than this of χ² per value: half the noise, ...
+const MINOR_MISFIT: f64 = 0.25;
+/// ... and those that are chosen in a smaller share of resamples, unless they are tied.
+const LEAST_STABILITY: f64 = 0.8;
+
+/// The parameters of term `index` with their intervals.
+pub(super) fn estimates(search: &Search, index: usize, term: &Term, found: &Intervals) -> Vec<Estimate> {
+    let candidate = &search.estimator.plant.candidates()[term.candidate];
+    let first: usize = found.sizes[..index].iter().sum();
+    candidate
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(k, free)| {
+            let x = term.x[k];
+            let [low, high] = found.ends.get(first + k).copied().unwrap_or([x, x]);
+            let mut ends = [free.value(low), free.value(high)];
+            ends.sort_by(f64::total_cmp);
+            Estimate {
+                name: free.name.to_owned(),
+                value: free.value(x),
+                unit: free.unit.to_owned(),
+                ci95: ends.map(|end| end.is_finite().then_some(end)),
+                at_bound: x <= free.bounds[0] || x >= free.bounds[1],
+            }
+        })
+        .collect()
+}
+
+/// A cause with the model that lacks it.
+struct Weighed {
+    /// The model refitted without the cause.
+    without: Scored,
+    standing: Standing,
+    /// Causes, or sets of two, that the data cannot tell from it.
+    tied_with: Vec<String>,
+}
+
+/// Weighs term `index` of `best`.
+fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<Weighed, DiagnoseError> {
+    let mut without = best.model().clone();
+    let term = without.terms.remove(index);
+    (search.progress)(&format!("the gain of {}", search.id(term.candidate)));
+    let without = search.fitted_at_its_spread(&without)?;
+    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index))?;
+    let mut tied_with = ties.of(search, best, index);
+    tied_with.extend(pair_in_place(search, best, (&without, &screened), index, &tied_with)?);
+    Ok(Weighed { without, standing, tied_with })
+}
+
+/// All adopted causes, the discretisation among them, with their shares and roles; and the judgement of the whole model on unseen runs.
+///
+/// # Errors
+/// [`DiagnoseError`] if a model cannot be simulated.
+pub(super) fn adopted(
+    search: &Search,
+    judged: &Judged,
+    bare: &Scored,
+    causes: &Causes,
+    ties: &Ties,
+) -> Result<(Vec<Adopted>, Unseen), DiagnoseError> {
+    let best = &judged.best;
+    let count = best.model().terms.len();
+    let weighed: Vec<Weighed> =
+        (0..count).map(|index| weighed(search, best, index, ties)).collect::<Result<_, DiagnoseError>>()?;
+    let needs: Vec<&[usize]> = weighed.iter().map(|weighed| weighed.standing.needs.as_slice()).collect();
+    let unseen = Unseen::of(search, best, &needs)?;
+    let mut effects = Vec::new();
+    if judged.refined {
+        let coarse = Unseen::of(search, &judged.coarse, &needs)?;
+        effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
+    }
+    let (mut whole, mut unstable) = (whole_misfit(search, best, bare)?, Vec::new());
+    for (index, Weighed { without, standing, tied_with }) in weighed.iter().enumerate() {
+        let mut others = needs.clone();
+        others.remove(index);
+        let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others)?, search);
+        let mut effect = effect(search, judged, index, standing, tied_with);
+        effect.share = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
+        effect.gain_heldout = gain_heldout;
+        let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
+        let own = causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
+        effect.nearest = own.map(|(_, tried)| tried.clone()).unwrap_or_default();
+        if standing.stability.is_some_and(|stability| stability < LEAST_STABILITY) {
+            unstable.push(effects.len());
+        }
+        effects.push(effect);
+    }
+    whole = whole.max(f64::MIN_POSITIVE);
+    set_roles(&mut effects, whole);
+    set_unstable(&mut effects, &unstable);
+    Ok((effects, unseen))
+}
+
+/// Term `index` as an adopted cause, without its share and gain.
+fn effect(search: &Search, judged: &Judged, index: usize, standing: &Standing, tied_with: &[String]) -> Adopted {
+    let best = &judged.best;
+    let term = &best.model().terms[index];
+    let candidate = search.candidate(term);
+    // The actuator was found by trying all of them; other given parameters are the form of the equation.
+    let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().copied().partition(|(name, _)| *name == "actuator");
+    let which = found_by_trying.into_iter().map(|(name, value)| Estimate {
+        name: name.to_owned(),
+        value,
+        unit: String::new(),
+        ci95: [Some(value); 2],
+        at_bound: false,
+    });
+    Adopted {
+        id: candidate.id.to_owned(),
+        kind: candidate.kind.to_owned(),
+        place: candidate.places.first().copied().unwrap_or(candidate.kind).to_owned(),
+        cause: candidate.cause.to_owned(),
+        parameters: which.chain(estimates(search, index, term, &judged.intervals)).collect(),
+        tied_with: tied_with.to_vec(),
+        share: 0.0,
+        role: if standing.is_left_by_law { Part::Minor } else { Part::Cause },
+        stability: standing.stability,
+        curve: curve(search, best, index, &judged.intervals),
+        nearest: Vec::new(),
+        gain_heldout: 0.0,
+        fixed: form.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+    }
+}
+
+/// χ² per value that all causes together remove from the refined nominal model: with re-tuned constants, or as it is where these are the causes.
+fn whole_misfit(search: &Search, best: &Scored, bare: &Scored) -> Result<f64, DiagnoseError> {
+    let count = search.estimator.count(&search.split.all()) as f64;
+    let chi2 = |scored: &Scored| search.chi2(scored);
+    let is_constant = |term: &Term| search.estimator.plant.candidates()[term.candidate].is_constant;
+    if best.model().terms.iter().any(is_constant) {
+        return Ok((chi2(bare) - chi2(best)) / count);
+    }
+    let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
+    Ok((chi2(&search.fitted_at_its_spread(&tuned)?) - chi2(best)) / count)
+}
+
+/// Sets the roles of causes, and their shares of `whole`, both χ² per value at first.
+fn set_roles(effects: &mut [Adopted], whole: f64) {
+    let own: Vec<f64> = effects.iter().map(|effect| effect.share).collect();
+    for effect in effects.iter_mut() {
+        effect.share = if whole > 0.0 { (effect.share / whole).min(1.0) } else { 0.0 };
+    }
+    let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
+    order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
+    let mut sum = 0.0;
+    // What slope of a loop is called its gain is a convention: within the opening of the loop a gain is no cause of its own.
+    let value = |id: &str, name: &str| {
+        let effect = effects.iter().find(|effect| effect.id == id)?;
+        effect.parameters.iter().find(|p| p.name == name).map(|p| p.value)
+    };
+    let is_convention = match (value("hysteresis", "width"), value("actuation-gain", "scale")) {
+        (Some(width), Some(scale)) => (scale - 1.0).abs() < width,
+        _ => false,
+    };
+    for k in order {
+        sum += effects[k].share;
+        let effect = &mut effects[k];
+        if sum <= MINOR_SHARE || own[k] < MINOR_MISFIT || (is_convention && effect.id == "actuation-gain") {
+            effect.role = Part::Minor;
+        }
+    }
+}
+
+/// Causes that hang on one or two runs are minor, unless they are tied: then it is said what else may be chosen.
+fn set_unstable(effects: &mut [Adopted], unstable: &[usize]) {
+    for at in unstable {
+        if effects[*at].tied_with.is_empty() {
+            effects[*at].role = Part::Minor;
+        }
+    }
+}
+
+/// The refinement as an adopted cause.
+fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted {
+    let resolutions = search.estimator.plant.resolutions();
+    let at = resolutions.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
+    let neighbours = [at.saturating_sub(1), (at + 1).min(resolutions.len() - 1)].map(|k| Some(resolutions[k]));
+    Adopted {
+        id: "discretisation".into(),
+        kind: "numerics".into(),
+        place: "discretisation".into(),
+        cause: "Finitely many joints and a finite time step stand for a continuum.".into(),
+        parameters: vec![Estimate {
+            name: "motors_per_actuator".into(),
+            value: best.model().resolution,
+            unit: String::new(),
+            ci95: neighbours,
+            at_bound: at + 1 == resolutions.len(),
+        }],
+        tied_with: Vec::new(),
+        share: 0.0,
+        role: Part::Cause,
+        stability: None,
+        curve: None,
+        nearest: Vec::new(),
+        gain_heldout,
+        fixed: Vec::new(),
+    }
+}

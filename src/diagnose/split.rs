@@ -1,0 +1,112 @@
+//! Three kinds of runs: those that parameters are fitted to, those that causes are selected on, and those that judge the result, once.
+
+use super::dataset::Role;
+use super::plant::{Plant, Signal};
+
+/// Fewest runs of which some are kept to judge by; fewer are judged by cross-validation.
+const LEAST_FOR_THREE_KINDS: usize = 8;
+
+/// Runs by what they are for, by index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Split {
+    /// Parameters are fitted to them.
+    pub fit: Vec<usize>,
+    /// Causes are selected on them: no parameter is fitted to them, but what is adopted depends on them.
+    pub select: Vec<usize>,
+    /// The final model is judged on them: neither parameters nor selection see them.
+    pub judge: Vec<usize>,
+}
+
+impl Split {
+    /// The runs that the search sees, in order.
+    pub fn all(&self) -> Vec<usize> {
+        let mut all = [self.fit.as_slice(), &self.select].concat();
+        all.sort_unstable();
+        all
+    }
+
+    /// What a run is for: `fit`, `select` or `judge`.
+    pub fn role(&self, run: usize) -> &'static str {
+        match run {
+            run if self.judge.contains(&run) => "judge",
+            run if self.select.contains(&run) => "select",
+            _ => "fit",
+        }
+    }
+}
+
+/// Splits runs by what they are for; given roles are kept, and of several given `held-out` runs every other one judges.
+///
+/// The others are split in the same way among runs with jumps of the input and among those without: in order of the input's speed, one of every
+/// three neighbours is selected on, in turn the one with the largest and the one with the smallest range; the slowest and the fastest never are. Of two
+/// or three runs in all, the last or middle one is. Of [`LEAST_FOR_THREE_KINDS`] runs or more, another one of every three judges.
+pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
+    let signals = plant.signals();
+    let (mut fit, mut select, mut judge, mut held_out) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut kinds: [Vec<Pace>; 2] = [Vec::new(), Vec::new()];
+    for (run, signal) in signals.iter().enumerate() {
+        match roles.get(run).copied().unwrap_or_default() {
+            Role::Fit => fit.push(run),
+            Role::HeldOut => held_out.push(run),
+            Role::Auto => {
+                let pace = Pace::of(run, signal);
+                kinds[usize::from(pace.jumps)].push(pace);
+            }
+        }
+    }
+    for (index, run) in held_out.iter().enumerate() {
+        if index % 2 == 0 { select.push(*run) } else { judge.push(*run) }
+    }
+    let has_judges = held_out.is_empty() && signals.len() >= LEAST_FOR_THREE_KINDS;
+    for mut order in kinds {
+        order.sort_by(|a, b| a.speed.total_cmp(&b.speed).then(a.range.total_cmp(&b.range)));
+        let count = order.len();
+        let inner = if count < 3 { 0..0 } else { 1..count - 1 };
+        for (index, group) in order[inner].chunks(3).enumerate() {
+            let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
+            let by_range = |a: &&Pace, b: &&Pace| (sign * a.range).total_cmp(&(sign * b.range));
+            select.extend(group.iter().max_by(by_range).map(|pace| pace.run));
+            if has_judges && group.len() == 3 {
+                judge.extend(group.iter().min_by(by_range).map(|pace| pace.run));
+            }
+        }
+        fit.extend(order.iter().map(|pace| pace.run).filter(|run| !select.contains(run) && !judge.contains(run)));
+    }
+    [&mut fit, &mut select, &mut judge].into_iter().for_each(|runs| runs.sort_unstable());
+    if fit.is_empty() {
+        std::mem::swap(&mut fit, &mut select);
+    }
+    if select.is_empty() && fit.len() >= 2 && roles.iter().all(|role| *role == Role::Auto) {
+        select.extend(fit.pop());
+    }
+    Split { fit, select, judge }
+}
+
+/// Speed and range of a run's input.
+struct Pace {
+    run: usize,
+    /// Path of the input over its range, per second.
+    speed: f64,
+    /// Largest less smallest input.
+    range: f64,
+    /// True if the input jumps between two rows.
+    jumps: bool,
+}
+
+impl Pace {
+    fn of(run: usize, signal: &Signal) -> Self {
+        let (low, high) =
+            signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+        let range = (high - low).max(1e-9);
+        let (mut path, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
+        for (u, t) in signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]) {
+            path += (u[1] - u[0]).abs();
+            largest = largest.max((u[1] - u[0]).abs());
+            time += t[1] - t[0];
+        }
+        let rows = signal.inputs.len().max(1) as f64;
+        // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
+        let jumps = largest > 6.0 * path / rows && largest > 0.05 * range;
+        Self { run, speed: path / range / f64::max(time, 1e-9), range, jumps }
+    }
+}
