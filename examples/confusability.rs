@@ -177,7 +177,8 @@ fn main() {
 /// True if there are causes, and all of them are named.
 fn are_named(d: &Diagnosis, effects: &[String]) -> bool {
     let is_in = |tied: &String, id: &str| tied.split('+').any(|tied| tied == id);
-    let is_named = |id: &str| d.effects.iter().any(|effect| effect.id == id || effect.tied_with.iter().any(|tied| is_in(tied, id)));
+    let is_named =
+        |id: &str| d.effects.iter().any(|effect| effect.id == id || effect.tied_with.iter().any(|tied| is_in(tied, id)));
     !effects.is_empty() && cases::named(effects).into_iter().all(is_named)
 }
 
@@ -185,7 +186,7 @@ fn are_named(d: &Diagnosis, effects: &[String]) -> bool {
 fn is_expected(d: &Diagnosis, effects: &[String]) -> bool {
     match cases::named(effects)[..] {
         [] => d.verdict == Verdict::None,
-        [DRIFTING_GAIN] => d.verdict == Verdict::None && d.bench.iter().any(|fault| fault.id == "gain"),
+        [DRIFTING_GAIN] => d.verdict == Verdict::None && d.bench.faults.iter().any(|fault| fault.id == "gain"),
         [id] if OUTSIDE.contains(&id) => matches!(d.verdict, Verdict::Unexplained | Verdict::Located),
         [id] => is_right(d, id),
         _ => d.verdict != Verdict::Unexplained && are_named(d, effects),

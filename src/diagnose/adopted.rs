@@ -6,7 +6,7 @@ use super::curve::curve;
 use super::diagnosis::{Adopted, Estimate, Nearest, Part};
 use super::intervals::Intervals;
 use super::plant::{Model, Term};
-use super::search::{Scored, Search};
+use super::search::{Scored, Search, VISIBLE};
 use super::stability::{Standing, standing};
 use super::ties::{Ties, pair_in_place};
 use super::unseen::Unseen;
@@ -15,7 +15,7 @@ use super::verdict::Judged;
 /// Causes are minor that together remove no more than this share, ...
 const MINOR_SHARE: f64 = 0.02;
 /// ... those that remove less than this of χ² per value: half the noise, ...
-const MINOR_MISFIT: f64 = 0.25;
+const MINOR_MISFIT: f64 = VISIBLE;
 /// ... and those that are chosen in a smaller share of resamples, unless they are tied.
 const LEAST_STABILITY: f64 = 0.8;
 
@@ -54,10 +54,8 @@ struct Weighed {
 
 /// Weighs term `index` of `best`.
 fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<Weighed, DiagnoseError> {
-    let mut without = best.model().clone();
-    let term = without.terms.remove(index);
-    (search.progress)(&format!("the gain of {}", search.id(term.candidate)));
-    let without = search.fitted_at_its_spread(&without)?;
+    (search.progress)(&format!("the gain of {}", search.id(best.model().terms[index].candidate)));
+    let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index))?;
     let mut tied_with = ties.of(search, best, index);
     tied_with.extend(pair_in_place(search, best, (&without, &screened), index, &tied_with)?);
@@ -86,24 +84,27 @@ pub(super) fn adopted(
         let coarse = Unseen::of(search, &judged.coarse, &needs)?;
         effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
     }
-    let (mut whole, mut unstable) = (whole_misfit(search, best, bare)?, Vec::new());
+    let (whole, mut unstable, mut taken) = (Whole::of(search, best, bare)?, Vec::new(), Vec::new());
+    taken.resize(effects.len(), 0.0);
     for (index, Weighed { without, standing, tied_with }) in weighed.iter().enumerate() {
         let mut others = needs.clone();
         others.remove(index);
         let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others)?, search);
         let mut effect = effect(search, judged, index, standing, tied_with);
-        effect.share = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
+        let own = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
+        taken.push(own);
+        effect.share = whole.share(own, search.candidate(&best.model().terms[index]).is_constant);
         effect.gain_heldout = gain_heldout;
         let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
-        let own = causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
+        let own =
+            causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
         effect.nearest = own.map(|(_, tried)| tried.clone()).unwrap_or_default();
         if standing.stability.is_some_and(|stability| stability < LEAST_STABILITY) {
             unstable.push(effects.len());
         }
         effects.push(effect);
     }
-    whole = whole.max(f64::MIN_POSITIVE);
-    set_roles(&mut effects, whole);
+    set_roles(&mut effects, &taken);
     set_unstable(&mut effects, &unstable);
     Ok((effects, unseen))
 }
@@ -139,24 +140,31 @@ fn effect(search: &Search, judged: &Judged, index: usize, standing: &Standing, t
     }
 }
 
-/// χ² per value that all causes together remove from the refined nominal model: with re-tuned constants, or as it is where these are the causes.
-fn whole_misfit(search: &Search, best: &Scored, bare: &Scored) -> Result<f64, DiagnoseError> {
-    let count = search.estimator.count(&search.split.all()) as f64;
-    let chi2 = |scored: &Scored| search.chi2(scored);
-    let is_constant = |term: &Term| search.estimator.plant.candidates()[term.candidate].is_constant;
-    if best.model().terms.iter().any(is_constant) {
-        return Ok((chi2(bare) - chi2(best)) / count);
-    }
-    let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
-    Ok((chi2(&search.fitted_at_its_spread(&tuned)?) - chi2(best)) / count)
+/// What causes have to explain, as χ² per value above that of the model with all of them.
+struct Whole {
+    /// Left by the refined nominal model: what constants share.
+    bare: f64,
+    /// Left by the refined nominal model with re-tuned constants: what other causes share.
+    tuned: f64,
 }
 
-/// Sets the roles of causes, and their shares of `whole`, both χ² per value at first.
-fn set_roles(effects: &mut [Adopted], whole: f64) {
-    let own: Vec<f64> = effects.iter().map(|effect| effect.share).collect();
-    for effect in effects.iter_mut() {
-        effect.share = if whole > 0.0 { (effect.share / whole).min(1.0) } else { 0.0 };
+impl Whole {
+    fn of(search: &Search, best: &Scored, bare: &Scored) -> Result<Self, DiagnoseError> {
+        let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
+        let tuned = search.fitted_at_its_spread(&tuned)?;
+        let count = search.estimator.count(&search.split.all()) as f64;
+        let left = |scored: &Scored| ((search.chi2(scored) - search.chi2(best)) / count).max(f64::MIN_POSITIVE);
+        Ok(Self { bare: left(bare), tuned: left(&tuned) })
     }
+
+    /// The share of a cause that removes `own` (χ² per value).
+    fn share(&self, own: f64, is_constant: bool) -> f64 {
+        (own / if is_constant { self.bare } else { self.tuned }).clamp(0.0, 1.0)
+    }
+}
+
+/// Sets the roles of causes, from their shares and what each removes (χ² per value).
+fn set_roles(effects: &mut [Adopted], taken: &[f64]) {
     let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
     order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
     let mut sum = 0.0;
@@ -172,7 +180,7 @@ fn set_roles(effects: &mut [Adopted], whole: f64) {
     for k in order {
         sum += effects[k].share;
         let effect = &mut effects[k];
-        if sum <= MINOR_SHARE || own[k] < MINOR_MISFIT || (is_convention && effect.id == "actuation-gain") {
+        if sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT || (is_convention && effect.id == "actuation-gain") {
             effect.role = Part::Minor;
         }
     }

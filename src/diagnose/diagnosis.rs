@@ -78,10 +78,8 @@ pub struct Adopted {
     /// Share of resamples that leave out one or two runs in which it is chosen, by linear estimates (0 to 1); none with few runs.
     pub stability: Option<f64>,
     /// The curve of a free form.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
     /// The named causes that were tried in the stead of the place's free form, nearest first.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub nearest: Vec<Nearest>,
     /// Share of the held-out χ² above the noise that it removes (0 to 1).
     pub gain_heldout: f64,
@@ -185,6 +183,23 @@ pub struct RunFault {
     pub sd: f64,
 }
 
+/// What was found of the bench: standard deviations between runs, 0 for a fault that is off.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct BenchFound {
+    /// Of the clock of the rows against that of the voltages (ms).
+    pub clock_ms: f64,
+    /// Of the zero of each channel (mm).
+    pub zero_mm: f64,
+    /// Of the gain of the inputs (–).
+    pub gain: f64,
+    /// Of the drift of each channel (mm/s).
+    pub drift_mm_per_s: f64,
+    /// Correlation time of the noise (s); 0 for white noise.
+    pub noise_correlation_s: f64,
+    /// Every fault that is not off, run by run.
+    pub faults: Vec<BenchFault>,
+}
+
 /// A fault of the bench that differs from run to run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BenchFault {
@@ -223,12 +238,10 @@ pub struct Diagnosis {
     pub noise_mm: f64,
     /// Share of the noise's variance that is correlated from row to row (–).
     pub noise_correlated: f64,
-    /// Its correlation time (s); 0 for white noise.
-    pub noise_correlation_time_s: f64,
     /// What judges the models: behind `gain_heldout` and `rmse_heldout_mm`; none of single numbers.
     pub judged_by: Option<JudgedBy>,
     /// Faults of the bench that differ from run to run, as far as the data ask for them.
-    pub bench: Vec<BenchFault>,
+    pub bench: BenchFound,
     /// The nominal model.
     pub baseline: Stage,
     /// The nominal model with re-tuned constants and refined discretisation.

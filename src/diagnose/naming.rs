@@ -102,13 +102,14 @@ impl<'a> Place<'a> {
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
     fn single(&self) -> Result<Vec<Attempt>, DiagnoseError> {
-        let screened = self.search.screen_of(&self.bare, |candidate| self.is_name(candidate))?.ranked;
+        let screened = self.search.screen_of(&self.bare, |candidate| self.is_name(candidate))?;
         let own = PROMISING_IN_PLACE * (self.bare.total() - self.best.total());
-        let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| self.is_rival(model)).collect();
+        let rivals: Vec<&(f64, Model)> = screened.ranked.iter().filter(|(_, model)| self.is_rival(model)).collect();
         // The nearest one is shown even if it is far.
         let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
         let models = self.search.finalists(promising, MOST_NAMES);
-        let mut tried: Vec<Attempt> = models.iter().filter_map(|model| self.attempt(model)).collect();
+        let start = |model: &Model| self.search.start_beyond(model, &screened).ok();
+        let mut tried: Vec<Attempt> = models.iter().filter_map(|model| self.attempt(&start(model)?)).collect();
         if tried.iter().all(|attempt| attempt.taken < LEAST_TAKEN) {
             // Constants that the free form did not need may make up for what a name lacks.
             let most = tried.iter().max_by(|a, b| a.taken.total_cmp(&b.taken));
@@ -138,9 +139,14 @@ impl<'a> Place<'a> {
             }
         }
         for first in firsts {
-            let screened = self.search.screen_of(&first.scored, |candidate| self.is_name(candidate))?.ranked;
-            let rivals = screened.iter().filter(|(_, model)| self.is_rival(model));
-            pairs.extend(self.search.finalists(rivals, MOST_SECOND).iter().filter_map(|model| self.attempt(model)));
+            let screened = self.search.screen_of(&first.scored, |candidate| self.is_name(candidate))?;
+            let rivals = screened.ranked.iter().filter(|(_, model)| self.is_rival(model));
+            pairs.extend(
+                self.search
+                    .finalists(rivals, MOST_SECOND)
+                    .iter()
+                    .filter_map(|model| self.attempt(&self.search.start_beyond(model, &screened).ok()?)),
+            );
         }
         Ok(pairs)
     }

@@ -82,7 +82,15 @@ pub fn diagnose(
     }
     remarks.extend(judged.remark.clone());
     remarks.extend(insufficient.clone().filter(|insufficient| !remarks.contains(insufficient)));
-    let report = Report { search: &search, judged: &judged, causes: &causes, ties: &ties, unseen, nominal: &nominal, calibrated: &calibrated };
+    let report = Report {
+        search: &search,
+        judged: &judged,
+        causes: &causes,
+        ties: &ties,
+        unseen,
+        nominal: &nominal,
+        calibrated: &calibrated,
+    };
     let verdict = verdict(&search, &judged, &effects, insufficient.is_some());
     let models: Vec<Model> =
         std::iter::once(judged.best.model().clone()).chain(ties.models().map(|scored| scored.model().clone())).collect();
@@ -124,11 +132,7 @@ struct Prepared<'a> {
 }
 
 /// Re-tunes the constants, and measures the noise of what they leave.
-fn prepare<'a>(
-    plant: &'a dyn Plant,
-    roles: &[Role],
-    progress: &'a (dyn Fn(&str) + Sync),
-) -> Result<Prepared<'a>, DiagnoseError> {
+fn prepare<'a>(plant: &'a dyn Plant, roles: &[Role], progress: &'a (dyn Fn(&str) + Sync)) -> Result<Prepared<'a>, DiagnoseError> {
     let resolutions = plant.resolutions();
     let nominal_resolution = resolutions.first().copied().unwrap_or(1.0);
     let start = resolutions.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
@@ -159,19 +163,12 @@ struct Decided {
 }
 
 /// Judges a model, and drops causes whose intervals contain their off values.
-fn decide(
-    search: &Search,
-    best: Scored,
-    bare: &Scored,
-    open: f64,
-    nominal_resolution: f64,
-) -> Result<Decided, DiagnoseError> {
+fn decide(search: &Search, best: Scored, bare: &Scored, open: f64, nominal_resolution: f64) -> Result<Decided, DiagnoseError> {
     let mut judged = judge(search, best, bare, open, nominal_resolution)?;
     let (mut doubts, mut dropped, remark) = (Vec::new(), None, judged.remark.take());
     while let Some((index, words)) = doubtful(search, &judged)? {
-        let mut model = judged.best.model().clone();
+        let model = search.without(&judged.best, index)?;
         dropped = Some(judged.best.model().clone());
-        model.terms.remove(index);
         doubts.push(words);
         judged = judge(search, search.fitted(&model)?, bare, f64::INFINITY, nominal_resolution)?;
     }
@@ -225,7 +222,7 @@ impl Report<'_, '_> {
         let has_rest = *left > LEFT_OVER && *unexplained_fraction > SOUGHT;
         let noise = &search.estimator.noise;
         let bench = faults::found(&search.estimator, best.model())?;
-        quality.extend(faults::remarks(&bench, noise, search.estimator.plant));
+        quality.extend(faults::remarks(&bench.faults, noise, search.estimator.plant));
         let [baseline, calibrated, extended] = self.stages()?;
         let failed = failing(&extended.residual_tests);
         let combinations = combinations(search, best, &self.ties.terms())?;
@@ -259,7 +256,6 @@ impl Report<'_, '_> {
             },
             noise_mm: self.noise_level(),
             noise_correlated: noise.correlated,
-            noise_correlation_time_s: noise.time_s,
             judged_by: Some(judged_by),
             bench,
             baseline,
@@ -344,7 +340,8 @@ impl Report<'_, '_> {
         let every = (0..estimator.plant.signals().len()).map(|run| self.squares(&scored.plain[run], run));
         // Jackknife over runs.
         let held = root_mean(judged.iter().copied());
-        let left_out = |out: usize| root_mean(judged.iter().enumerate().filter(|(at, _)| *at != out).map(|(_, squares)| *squares));
+        let left_out =
+            |out: usize| root_mean(judged.iter().enumerate().filter(|(at, _)| *at != out).map(|(_, squares)| *squares));
         let n = judged.len() as f64;
         let without: Vec<f64> = (0..judged.len()).map(left_out).collect();
         let mean = without.iter().sum::<f64>() / n.max(1.0);

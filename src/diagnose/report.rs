@@ -367,12 +367,12 @@ fn tests(out: &mut String, d: &Diagnosis) {
 }
 
 fn bench(out: &mut String, d: &Diagnosis) {
-    if d.bench.is_empty() {
+    if d.bench.faults.is_empty() {
         return;
     }
     out.push_str("<h2>Faults of the bench, run by run</h2>\n");
     let mut table = Table::new(&["fault", "run", "channel", "#value", "#standard deviation", "unit"]);
-    for fault in &d.bench {
+    for fault in &d.bench.faults {
         for run in &fault.runs {
             table.row([
                 fault.id.into(),
@@ -388,6 +388,7 @@ fn bench(out: &mut String, d: &Diagnosis) {
         out,
         "<p>They are nuisance parameters with a normal prior and no causes. {}.</p><details><summary>All values</summary>\n{}</details>",
         d.bench
+            .faults
             .iter()
             .map(|fault| {
                 let unit = if fault.unit.is_empty() { String::new() } else { format!(" {}", fault.unit) };

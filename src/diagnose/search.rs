@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, sum_of_squares};
+use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, inner, sum_of_squares};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::split::Split;
@@ -20,19 +20,24 @@ pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
 /// right; ...
 const LEAST_SHARE: f64 = 0.004;
-/// Nothing more is sought once no more than this share of it is left: further causes would be minor, and would parcel out what the laws of the
-/// others do not follow.
+/// Nothing more is sought once no more than this share of it is left and less than [`VISIBLE`]: further causes would be minor, and would parcel out what
+/// the laws of the others do not follow.
 pub(super) const SOUGHT: f64 = 0.02;
+/// Misfit (χ² per value above 1) of half the noise.
+pub(super) const VISIBLE: f64 = 0.25;
 /// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
 const LEAST_BIC: f64 = 10.0;
 /// A cause that no held-out run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
 const SEEN_BY_FIT: f64 = 0.1;
+/// A cause whose linear estimate exceeds that by this factor is not left out on trial.
+const CLEARLY: f64 = 3.0;
 /// Two models are tied if their χ² differ by less than this or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
-/// Candidates that are fitted after screening: named ones and free forms.
+/// Candidates that are fitted after screening: named ones, forms of one cause among them, and free forms.
 const FINALISTS: usize = 7;
+const FORMS: usize = 2;
 const FREE_FINALISTS: usize = 3;
 /// Candidates are fitted whose linear estimate is at least this share of the best one's: in a search, among free forms, and in the place of a cause
 /// whose own share is 1.
@@ -41,6 +46,8 @@ const PROMISING_FREE: f64 = 0.4;
 pub(super) const PROMISING_IN_PLACE: f64 = 0.3;
 /// Terms that are left out on trial in a round of elimination, the least significant ones.
 const LEAST_SIGNIFICANT: usize = 3;
+/// Share of the diagonal by which the linear estimate of a start is regularised.
+const LEAST_RIDGE: f64 = 1e-6;
 /// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
@@ -124,6 +131,9 @@ pub struct Screened {
     pub(super) tangents: Vec<DVector<f64>>,
     /// The derivatives by the model's coordinates, of all runs.
     derivatives: Derivatives,
+    /// The model's residuals, and the number of its terms.
+    residuals: Vec<Residuals>,
+    terms: usize,
 }
 
 impl Search<'_> {
@@ -199,6 +209,14 @@ impl Search<'_> {
         self.score(self.estimator.fit(model, &self.split.fit, Convergence::Full)?)
     }
 
+    /// [`fitted_at_its_spread`](Self::fitted_at_its_spread) to the convergence of [`Convergence::Rank`].
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn ranked_at_its_spread(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+        self.score(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?)
+    }
+
     /// Fits the spread of the bench's faults and a model in turn, from a first fit of the model, and scores it.
     fn with_spread(&self, first: Fit, convergence: Convergence) -> Result<Scored, DiagnoseError> {
         let mut best = self.score(first)?;
@@ -214,17 +232,79 @@ impl Search<'_> {
     }
 
     /// Fits a model to the convergence of [`Convergence::Rank`] and scores it.
-    fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+    pub(super) fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
         self.with_spread(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?, Convergence::Rank)
     }
 
     /// [`ranked`](Self::ranked) for a model with terms beyond those that were screened.
     fn ranked_beyond(&self, model: &Model, screened: &Screened) -> Result<Scored, DiagnoseError> {
+        let start = self.start_beyond(model, screened)?;
+        let known = self.known(screened);
+        self.with_spread(self.estimator.fit_beyond(&start, &self.split.fit, &known)?, Convergence::Rank)
+    }
+
+    /// The derivatives of a screening on the fit runs.
+    fn known(&self, screened: &Screened) -> Derivatives {
         let all = self.split.all();
         let at: Vec<usize> = self.split.fit.iter().filter_map(|run| all.binary_search(run).ok()).collect();
         let of_fit_runs = |column: &Vec<Residuals>| at.iter().map(|run| column[*run].clone()).collect();
-        let known: Derivatives = screened.derivatives.iter().map(of_fit_runs).collect();
-        self.with_spread(self.estimator.fit_beyond(model, &self.split.fit, &known)?, Convergence::Rank)
+        screened.derivatives.iter().map(of_fit_runs).collect()
+    }
+
+    /// The start of a fit with terms beyond those that were screened: where the terms and the model's own coordinates together lower χ² most, by
+    /// linear estimates, or on the way there. A term that does what others did for it before leads uphill if these stay as they are.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if `model` cannot be simulated.
+    pub(super) fn start_beyond(&self, model: &Model, screened: &Screened) -> Result<Model, DiagnoseError> {
+        let (runs, known) = (&self.split.fit, self.known(screened));
+        let before: Vec<&Residuals> = runs.iter().map(|run| &screened.residuals[*run]).collect();
+        let chi2 = |residuals: &[Residuals]| residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>();
+        let moved = self.estimator.residuals_of(model, runs)?;
+        let change: Vec<Residuals> =
+            moved.iter().zip(&before).map(|(a, b)| a.iter().zip(*b).map(|(a, b)| a - b).collect()).collect();
+        let columns: Vec<&Vec<Residuals>> = std::iter::once(&change).chain(&known).collect();
+        let n = columns.len();
+        let mut information =
+            DMatrix::from_fn(
+                n,
+                n,
+                |i, j| {
+                    if i <= j { columns[i].iter().zip(columns[j]).map(|(a, b)| inner(a, b)).sum() } else { 0.0 }
+                },
+            );
+        information.fill_lower_triangle_with_upper_triangle();
+        (0..n).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
+        let right = DVector::from_fn(n, |k, _| -columns[k].iter().zip(&before).map(|(a, b)| inner(a, b)).sum::<f64>());
+        let mut best = (chi2(&moved), model.clone());
+        let Some(by) = information.lu().solve(&right).filter(|by| by[0] > 0.0 && by.iter().all(|by| by.is_finite())) else {
+            return Ok(best.1);
+        };
+        for share in [1.0, 0.5, 0.25] {
+            let start = self.on_the_way(model, screened.terms, &(&by * share));
+            // A point that cannot be simulated is none to start from.
+            let Ok(residuals) = self.estimator.residuals_of(&start, runs) else { continue };
+            if chi2(&residuals) < best.0 {
+                best = (chi2(&residuals), start);
+            }
+        }
+        Ok(best.1)
+    }
+
+    /// A model with its terms from `first` on moved from their off values by the share `by[0]` of the way to where they are, and the coordinates of the
+    /// terms before moved by the rest of `by`, within their bounds.
+    fn on_the_way(&self, model: &Model, first: usize, by: &DVector<f64>) -> Model {
+        let mut start = model.clone();
+        for (k, (term, parameter)) in coordinates(model).into_iter().enumerate() {
+            let Free { off, bounds: [low, high], .. } = self.candidate(&model.terms[term]).parameters[parameter];
+            let x = &mut start.terms[term].x[parameter];
+            *x = match off {
+                _ if term < first => (*x + by[k + 1]).clamp(low, high),
+                Some(off) => (off + by[0] * (*x - off)).clamp(low, high),
+                None => *x,
+            };
+        }
+        start
     }
 
     /// Alternates fits of nuisance parameters and model until χ² has converged.
@@ -346,11 +426,7 @@ impl Search<'_> {
         let own = from.model().terms.len();
         let mut all = self.fitted(&self.with_constants(from.model()))?;
         while all.model().terms.len() > own {
-            let without = |index: usize| {
-                let mut model = all.model().clone();
-                model.terms.remove(index);
-                self.ranked(&model).ok()
-            };
+            let without = |index: usize| self.ranked(&self.without(&all, index).ok()?).ok();
             let shorter = (own..all.model().terms.len()).filter_map(without);
             let Some(least) = shorter.min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(from) };
             if self.is_significant(&all, &least) {
@@ -414,7 +490,8 @@ impl Search<'_> {
             ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(Screened { ranked, columns, rest, tangents: own, derivatives })
+        let (residuals, terms) = (from.residuals.clone(), base.terms.len());
+        Ok(Screened { ranked, columns, rest, tangents: own, derivatives, residuals, terms })
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -488,9 +565,16 @@ impl Search<'_> {
         (Term { candidate: start.candidate, x: start.x.iter().zip(parameters).map(moved).collect() }, true)
     }
 
-    /// The best screened starts of `count` different candidates.
+    /// The best screened starts of `count` different candidates, at most [`FORMS`] of one cause.
     pub(super) fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
-        first_of_each(screened, count, |term| term.candidate)
+        let mut chosen: Vec<Model> = Vec::new();
+        for model in first_of_each(screened, usize::MAX, |term| term.candidate) {
+            let id = |model: &Model| model.terms.last().map(|term| self.id(term.candidate));
+            if chosen.len() < count && chosen.iter().filter(|other| id(other) == id(&model)).count() < FORMS {
+                chosen.push(model);
+            }
+        }
+        chosen
     }
 
     /// The best screened candidates fitted on top of `from`, best on held-out runs first, and the screening.
@@ -551,7 +635,7 @@ impl Search<'_> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
         let mut causes = 0;
-        while causes < MOST_CAUSES && self.share_left(&best) > SOUGHT {
+        while causes < MOST_CAUSES && self.is_sought(&best) {
             causes += 1;
             let (trials, screened) = self.trials(&best)?;
             // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
@@ -633,6 +717,11 @@ impl Search<'_> {
         self.unexplained = (chi2 / self.estimator.count(runs).max(1) as f64 - 1.0).max(0.0);
     }
 
+    /// True if more is sought: a model leaves a visible share of what re-tuned constants leave, or more than half the noise.
+    fn is_sought(&self, scored: &Scored) -> bool {
+        self.share_left(scored) > SOUGHT || self.above(scored) > VISIBLE
+    }
+
     /// What a model leaves, as a share of what re-tuned constants leave.
     pub(super) fn share_left(&self, scored: &Scored) -> f64 {
         let (chi2, runs) = self.chi2_to_judge_by(scored);
@@ -667,7 +756,12 @@ impl Search<'_> {
 
     /// True if the fit runs need what `less` leaves out.
     fn is_seen_by_fit(&self, more: &Scored, less: &Scored) -> bool {
-        less.fitted - more.fitted > SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
+        less.fitted - more.fitted > self.least_seen()
+    }
+
+    /// Least rise of χ² by which the fit runs need a cause.
+    fn least_seen(&self) -> f64 {
+        SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
     }
 
     /// A cause that shows in fit runs only: the run that it improves most is held out as well, and the cause, fitted to the others, has to improve it
@@ -701,10 +795,8 @@ impl Search<'_> {
         let mut best = from;
         loop {
             let shorter = |index: usize| {
-                let mut model = best.model().clone();
-                let term = model.terms.remove(index);
-                (self.progress)(&format!("doing without {}", self.id(term.candidate)));
-                self.ranked(&model)
+                (self.progress)(&format!("doing without {}", self.id(best.model().terms[index].candidate)));
+                self.ranked(&self.without(&best, index)?)
             };
             // First those within the error of the discretisation.
             let plant = self.estimator.plant;
@@ -724,8 +816,43 @@ impl Search<'_> {
         }
     }
 
+    /// A model without term `index`, whose other coordinates make up for it as far as they can by the linear estimate, if that lowers χ².
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model without the term cannot be simulated.
+    pub(super) fn without(&self, best: &Scored, index: usize) -> Result<Model, DiagnoseError> {
+        let model = best.model();
+        let information = &best.fit.information;
+        let (own, others): (Vec<_>, Vec<_>) =
+            coordinates(model).into_iter().enumerate().partition(|(_, (term, _))| *term == index);
+        let mut plain = model.clone();
+        let removed = plain.terms.remove(index);
+        if others.is_empty() || information.nrows() != own.len() + others.len() {
+            return Ok(plain);
+        }
+        let parameters = &self.candidate(&removed).parameters;
+        let by = DVector::from_iterator(own.len(), removed.x.iter().zip(parameters).map(|(x, p)| p.off.unwrap_or(*x) - x));
+        let of = |rows: &[(usize, (usize, usize))], columns: &[(usize, (usize, usize))]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| information[(rows[i].0, columns[j].0)])
+        };
+        let mut among_others = of(&others, &others);
+        (0..others.len()).for_each(|k| among_others[(k, k)] *= 1.0 + LEAST_RIDGE);
+        let Some(shift) = among_others.lu().solve(&-(of(&others, &own) * by)) else { return Ok(plain) };
+        let mut moved = plain.clone();
+        for ((term, parameter), by) in coordinates(&plain).into_iter().zip(shift.iter()) {
+            let [low, high] = self.candidate(&plain.terms[term]).parameters[parameter].bounds;
+            let x = &mut moved.terms[term].x[parameter];
+            *x = (*x + by).clamp(low, high);
+        }
+        let chi2 = |model: &Model| -> Result<f64, DiagnoseError> {
+            Ok(self.estimator.residuals_of(model, &self.split.fit)?.iter().map(|r| sum_of_squares(r)).sum())
+        };
+        let of_plain = chi2(&plain)?;
+        Ok(if chi2(&moved).is_ok_and(|of_moved| of_moved < of_plain) { moved } else { plain })
+    }
+
     /// The [`LEAST_SIGNIFICANT`] terms by Wald's statistic dᵀ C⁻¹ d, with d the distances of a term's coordinates from their off values and C their
-    /// covariance.
+    /// covariance; without those that are [`CLEARLY`] seen in the fit runs.
     fn least_significant(&self, best: &Scored) -> Vec<usize> {
         let covariance = covariance(&best.fit.information);
         let mut first = 0;
@@ -740,6 +867,7 @@ impl Search<'_> {
             let wald = part.lu().solve(&d).map_or(0.0, |solved| d.dot(&solved));
             order.push((if wald.is_finite() { wald } else { 0.0 }, index));
         }
+        order.retain(|(wald, _)| *wald < CLEARLY * self.least_seen());
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         order.into_iter().take(LEAST_SIGNIFICANT).map(|(_, index)| index).collect()
     }
@@ -758,11 +886,10 @@ impl Search<'_> {
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         for (index, removed) in best.model().terms.iter().enumerate() {
-            let mut model = best.model().clone();
-            model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
-            let Ok(without) = self.fitted_at_its_spread(&model) else { continue };
+            let without = self.without(best, index).and_then(|model| self.ranked_at_its_spread(&model));
+            let Ok(without) = without else { continue };
             let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();

@@ -39,7 +39,8 @@ impl Split {
 ///
 /// The others are split in the same way among runs with jumps of the input and among those without: in order of the input's speed, one of every
 /// three neighbours is selected on, in turn the one with the largest and the one with the smallest range; the slowest and the fastest never are. Of two
-/// or three runs in all, the last or middle one is. Of [`LEAST_FOR_THREE_KINDS`] runs or more, another one of every three judges.
+/// or three runs in all, the last or middle one is. Of [`LEAST_FOR_THREE_KINDS`] runs or more, of the other two of the three the one that moves less judges:
+/// what only large motions show is left to the fit.
 pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
     let signals = plant.signals();
     let (mut fit, mut select, mut judge, mut held_out) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -67,7 +68,8 @@ pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
             let by_range = |a: &&Pace, b: &&Pace| (sign * a.range).total_cmp(&(sign * b.range));
             select.extend(group.iter().max_by(by_range).map(|pace| pace.run));
             if has_judges && group.len() == 3 {
-                judge.extend(group.iter().min_by(by_range).map(|pace| pace.run));
+                let others = group.iter().filter(|pace| !select.contains(&pace.run));
+                judge.extend(others.min_by(|a, b| a.swing.total_cmp(&b.swing)).map(|pace| pace.run));
             }
         }
         fit.extend(order.iter().map(|pace| pace.run).filter(|run| !select.contains(run) && !judge.contains(run)));
@@ -89,6 +91,8 @@ struct Pace {
     speed: f64,
     /// Largest less smallest input.
     range: f64,
+    /// Standard deviation of the signal within its channels, in the plant's unit.
+    swing: f64,
     /// True if the input jumps between two rows.
     jumps: bool,
 }
@@ -107,6 +111,89 @@ impl Pace {
         let rows = signal.inputs.len().max(1) as f64;
         // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
         let jumps = largest > 6.0 * path / rows && largest > 0.05 * range;
-        Self { run, speed: path / range / f64::max(time, 1e-9), range, jumps }
+        Self { run, speed: path / range / f64::max(time, 1e-9), range, swing: swing(signal), jumps }
+    }
+}
+
+fn swing(signal: &Signal) -> f64 {
+    let channels = signal.channels.iter().max().map_or(0, |last| last + 1);
+    let mut sums = vec![[0.0; 3]; channels];
+    for (value, channel) in signal.values.iter().zip(&signal.channels) {
+        sums[*channel].iter_mut().zip([1.0, *value, value * value]).for_each(|(sum, term)| *sum += term);
+    }
+    let squares: f64 = sums.iter().filter(|[n, ..]| *n > 0.0).map(|[n, v, vv]| vv - v * v / n).sum();
+    (squares / signal.values.len().max(1) as f64).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::DiagnoseError;
+    use crate::diagnose::plant::{Candidate, Model, Nuisance};
+
+    struct Runs(Vec<Signal>);
+
+    impl Plant for Runs {
+        fn signals(&self) -> &[Signal] {
+            &self.0
+        }
+
+        fn channels(&self) -> Vec<String> {
+            vec!["y".into()]
+        }
+
+        fn unit(&self) -> &'static str {
+            ""
+        }
+
+        fn candidates(&self) -> &[Candidate] {
+            &[]
+        }
+
+        fn predict(&self, _: &Model, run: usize, _: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
+            Ok(self.0[run].values.clone())
+        }
+    }
+
+    /// Sines of a frequency (Hz) and an amplitude; the signal is the input times a gain.
+    fn runs(all: &[(f64, f64, f64)]) -> Runs {
+        let signal = |(hertz, amplitude, gain): &(f64, f64, f64)| {
+            let times: Vec<f64> = (0..400).map(|row| f64::from(row) / 400.0).collect();
+            let inputs: Vec<f64> = times.iter().map(|t| amplitude * (std::f64::consts::TAU * hertz * t).sin()).collect();
+            let values = inputs.iter().map(|u| gain * u).collect();
+            Signal { values, sigmas: vec![1.0; 400], times, channels: vec![0; 400], inputs, ..Signal::default() }
+        };
+        Runs(all.iter().map(signal).collect())
+    }
+
+    const EIGHT: [(f64, f64, f64); 8] = [
+        (1.0, 10.0, 1.0),
+        (2.0, 4.0, 1.0),
+        (2.0, 10.0, 1.0),
+        (3.0, 4.0, 1.0),
+        (4.0, 10.0, 1.0),
+        (5.0, 4.0, 5.0),
+        (5.0, 8.0, 5.0),
+        (9.0, 10.0, 1.0),
+    ];
+
+    #[test]
+    fn the_largest_motion_of_three_neighbours_is_never_kept_from_fit_and_selection() {
+        let split = split(&runs(&EIGHT), &[Role::Auto; 8]);
+        // Of 2, 2 and 3 Hz the largest input is selected on; of 4, 5 and 5 Hz the smallest, and the two others move by 10 and 40.
+        assert_eq!(split, Split { fit: vec![0, 3, 6, 7], select: vec![2, 5], judge: vec![1, 4] });
+        assert_eq!(split.all(), [0, 2, 3, 5, 6, 7]);
+        assert_eq!([0, 2, 4].map(|run| split.role(run)), ["fit", "select", "judge"]);
+    }
+
+    #[test]
+    fn few_runs_have_no_judges_and_given_roles_are_kept() {
+        let seven = split(&runs(&EIGHT[..7]), &[Role::Auto; 7]);
+        assert!(seven.judge.is_empty() && !seven.select.is_empty());
+        let mut roles = [Role::Fit; 8];
+        [3, 5, 6].into_iter().for_each(|run| roles[run] = Role::HeldOut);
+        assert_eq!(split(&runs(&EIGHT), &roles), Split { fit: vec![0, 1, 2, 4, 7], select: vec![3, 6], judge: vec![5] });
+        let two = split(&runs(&EIGHT[..2]), &[Role::Auto; 2]);
+        assert_eq!((two.fit.len(), two.select.len(), two.judge.len()), (1, 1, 0));
     }
 }

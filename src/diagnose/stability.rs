@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 
 use super::DiagnoseError;
-use super::plant::{Candidate, Model, Term};
 use super::fit::sum_of_squares;
+use super::plant::{Candidate, Model, Term};
 use super::search::{LEAST_GAIN, Scored, Screened, Search, Trial, joined, without_directions};
 
 /// Fewest runs that are resampled.
@@ -120,11 +120,7 @@ impl Contest {
             counts: runs.iter().map(|run| search.estimator.count(&[*run]) as f64).collect(),
             own: falls(best),
             own_parts: of(&column),
-            fitted: fitted
-                .iter()
-                .filter(|trial| is_rival(trial.candidate))
-                .map(|trial| falls(&trial.scored))
-                .collect(),
+            fitted: fitted.iter().filter(|trial| is_rival(trial.candidate)).map(|trial| falls(&trial.scored)).collect(),
             linear: screened
                 .columns
                 .iter()

@@ -1,16 +1,16 @@
 //! What a model with causes leaves, which of its causes the data doubt, and the verdict.
 
 use super::DiagnoseError;
+use super::adopted::estimates;
 use super::fit::BLOCK;
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
-use super::adopted::estimates;
 use super::plant::{Model, Plant, Term};
-use super::search::{Scored, Search};
+use super::search::{Scored, Search, VISIBLE};
 use super::split::Split;
 
 /// Structure is left if χ² per value exceeds 1 by this (a misfit of σ/2), ...
-pub(super) const LEFT_OVER: f64 = 0.25;
+pub(super) const LEFT_OVER: f64 = VISIBLE;
 /// ... and the verdict is unexplained if it is also by this share of what the refined nominal model leaves: a name stands with 95 % of what its place
 /// takes. For n causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
 pub(super) const LEFT_SHARE: f64 = 0.05;
@@ -45,7 +45,13 @@ pub(super) struct Judged {
 ///
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.
-pub(super) fn judge(search: &Search, mut best: Scored, bare: &Scored, open: f64, nominal_resolution: f64) -> Result<Judged, DiagnoseError> {
+pub(super) fn judge(
+    search: &Search,
+    mut best: Scored,
+    bare: &Scored,
+    open: f64,
+    nominal_resolution: f64,
+) -> Result<Judged, DiagnoseError> {
     let plant = search.estimator.plant;
     let above = |scored: &Scored| search.above(scored);
     let (left, whole) = (above(&best), above(bare));
@@ -107,8 +113,7 @@ pub(super) fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize
         if switches.is_empty() || !switches.iter().all(holds) {
             continue;
         }
-        let mut without = best.model().clone();
-        without.terms.remove(index);
+        let without = search.without(best, index)?;
         let inflation = own.map(|k| intervals.inflation[k]).fold(1.0, f64::max);
         let gain = (search.fitted(&without)?.fitted - best.fitted) / inflation;
         let needed = CHI2_95[(term.x.len() - 1).min(CHI2_95.len() - 1)];
