@@ -3,8 +3,10 @@
 use super::dataset::Role;
 use super::plant::{Plant, Signal};
 
-/// Fewest runs of which some are kept to judge by; fewer are judged by cross-validation.
-const LEAST_FOR_THREE_KINDS: usize = 8;
+/// Fewest runs of which some are kept to judge by. Of fewer, each may be the only one that shows a cause, so they are judged by cross-validation.
+const LEAST_FOR_THREE_KINDS: usize = 12;
+/// Most folds of a cross-validation.
+const FOLDS: usize = 4;
 
 /// Runs by what they are for, by index.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,6 +25,13 @@ impl Split {
         let mut all = [self.fit.as_slice(), &self.select].concat();
         all.sort_unstable();
         all
+    }
+
+    /// The folds of a cross-validation, which leave out every run once; none where there are runs that judge.
+    pub(super) fn folds(&self) -> Vec<Vec<usize>> {
+        let all = self.all();
+        let count = if self.judge.is_empty() { all.len().min(FOLDS) } else { 0 };
+        (0..count).map(|first| all.iter().copied().skip(first).step_by(count).collect()).collect()
     }
 
     /// What a run is for: `fit`, `select` or `judge`.
@@ -166,7 +175,7 @@ mod tests {
         Runs(all.iter().map(signal).collect())
     }
 
-    const EIGHT: [(f64, f64, f64); 8] = [
+    const TWELVE: [(f64, f64, f64); 12] = [
         (1.0, 10.0, 1.0),
         (2.0, 4.0, 1.0),
         (2.0, 10.0, 1.0),
@@ -174,26 +183,32 @@ mod tests {
         (4.0, 10.0, 1.0),
         (5.0, 4.0, 5.0),
         (5.0, 8.0, 5.0),
+        (6.0, 5.0, 1.0),
+        (6.0, 6.0, 1.0),
+        (6.0, 7.0, 1.0),
+        (7.0, 1.0, 1.0),
         (9.0, 10.0, 1.0),
     ];
 
     #[test]
     fn the_largest_motion_of_three_neighbours_is_never_kept_from_fit_and_selection() {
-        let split = split(&runs(&EIGHT), &[Role::Auto; 8]);
-        // Of 2, 2 and 3 Hz the largest input is selected on; of 4, 5 and 5 Hz the smallest, and the two others move by 10 and 40.
-        assert_eq!(split, Split { fit: vec![0, 3, 6, 7], select: vec![2, 5], judge: vec![1, 4] });
-        assert_eq!(split.all(), [0, 2, 3, 5, 6, 7]);
+        let split = split(&runs(&TWELVE), &[Role::Auto; 12]);
+        // Of 2, 2 and 3 Hz the largest input is selected on, of 4, 5 and 5 Hz the smallest, of 6 Hz the largest; of the others those that move less judge.
+        assert_eq!(split, Split { fit: vec![0, 3, 6, 8, 10, 11], select: vec![2, 5, 9], judge: vec![1, 4, 7] });
+        assert_eq!(split.all(), [0, 2, 3, 5, 6, 8, 9, 10, 11]);
         assert_eq!([0, 2, 4].map(|run| split.role(run)), ["fit", "select", "judge"]);
+        assert!(split.folds().is_empty());
     }
 
     #[test]
     fn few_runs_have_no_judges_and_given_roles_are_kept() {
-        let seven = split(&runs(&EIGHT[..7]), &[Role::Auto; 7]);
-        assert!(seven.judge.is_empty() && !seven.select.is_empty());
+        let eleven = split(&runs(&TWELVE[..11]), &[Role::Auto; 11]);
+        assert!(eleven.judge.is_empty() && !eleven.select.is_empty());
+        assert_eq!(eleven.folds(), [vec![0, 4, 8], vec![1, 5, 9], vec![2, 6, 10], vec![3, 7]]);
         let mut roles = [Role::Fit; 8];
         [3, 5, 6].into_iter().for_each(|run| roles[run] = Role::HeldOut);
-        assert_eq!(split(&runs(&EIGHT), &roles), Split { fit: vec![0, 1, 2, 4, 7], select: vec![3, 6], judge: vec![5] });
-        let two = split(&runs(&EIGHT[..2]), &[Role::Auto; 2]);
-        assert_eq!((two.fit.len(), two.select.len(), two.judge.len()), (1, 1, 0));
+        assert_eq!(split(&runs(&TWELVE[..8]), &roles), Split { fit: vec![0, 1, 2, 4, 7], select: vec![3, 6], judge: vec![5] });
+        let two = split(&runs(&TWELVE[..2]), &[Role::Auto; 2]);
+        assert_eq!((two.fit.len(), two.select.len(), two.folds().len()), (1, 1, 2));
     }
 }

@@ -19,7 +19,7 @@ const LEFT_BY_CONSTANT: f64 = 0.02;
 pub(super) struct Standing {
     /// Share of resamples in which it is chosen; none with few runs.
     pub(super) stability: Option<f64>,
-    /// Runs without which it would not be chosen.
+    /// Folds of the cross-validation without which it would not be chosen.
     pub(super) needs: Vec<usize>,
     /// True for a constant in the stead of which the free form of another cause's place would do as well, and beside which it still finds something: the
     /// constant may be what the law of that cause lacks.
@@ -49,10 +49,12 @@ pub(super) fn standing(
     let contest = Contest::new(search, best, without, index, &screened, fitted);
     let resamples: Vec<[usize; 2]> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).collect();
     let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..])).count();
-    let is_lost_without = |at: &usize| !contest.chooses(&[*at]);
+    let places = |fold: &[usize]| -> Vec<usize> { (0..runs.len()).filter(|at| fold.contains(&runs[*at])).collect() };
+    let folds = search.split.folds();
+    let is_lost_without = |fold: &usize| !contest.chooses(&places(&folds[*fold]));
     let standing = Standing {
         stability: Some(chosen as f64 / resamples.len() as f64),
-        needs: (0..runs.len()).filter(is_lost_without).map(|at| runs[at]).collect(),
+        needs: (0..folds.len()).filter(is_lost_without).collect(),
         is_left_by_law,
     };
     Ok((standing, screened))

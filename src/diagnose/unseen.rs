@@ -1,7 +1,8 @@
 //! Errors on runs that neither parameters nor selection saw.
 //!
-//! With enough runs some are kept to judge by, and seen once, at the end. With few runs the judgement is a nested cross-validation: each run in turn is
-//! left out, the causes that would not be chosen without it are left out as well, the parameters are fitted to all other runs, and the run is judged.
+//! With enough runs some are kept to judge by, and seen once, at the end. With few runs the judgement is a nested cross-validation: each fold of the runs
+//! in turn is left out, the causes that would not be chosen without it are left out as well, the parameters are fitted to all other runs, and the fold is
+//! judged.
 
 use rayon::prelude::*;
 
@@ -27,30 +28,40 @@ impl Unseen {
         if search.split.judge.is_empty() { JudgedBy::CrossValidation } else { JudgedBy::JudgeRuns }
     }
 
-    /// Judges a model; `needs` holds for each of its terms the runs without which it would not be chosen.
+    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be chosen.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub(super) fn of(search: &Search, scored: &Scored, needs: &[&[usize]]) -> Result<Self, DiagnoseError> {
-        let runs = if search.split.judge.is_empty() { search.split.all() } else { search.split.judge.clone() };
-        let judged = |run: &usize| {
-            let model = Self::without(search, scored.model(), *run, needs)?;
-            let chi2 = sum_of_squares(&search.estimator.residuals(&model, *run)?);
-            Ok((search.estimator.plain_residuals_of(&model, *run)?, chi2))
+        let (mut runs, mut models) = (Vec::new(), Vec::new());
+        for run in &search.split.judge {
+            runs.push(*run);
+            models.push(scored.model().clone());
+        }
+        for (fold, left_out) in search.split.folds().into_iter().enumerate() {
+            let model = Self::without(search, scored.model(), (fold, &left_out), needs)?;
+            models.extend(left_out.iter().map(|_| model.clone()));
+            runs.extend(left_out);
+        }
+        let judged = |(run, model): (&usize, &Model)| {
+            let chi2 = sum_of_squares(&search.estimator.residuals(model, *run)?);
+            Ok((search.estimator.plain_residuals_of(model, *run)?, chi2))
         };
-        let judged: Vec<(Residuals, f64)> = runs.par_iter().map(judged).collect::<Result<_, DiagnoseError>>()?;
+        let judged: Vec<(Residuals, f64)> = runs.par_iter().zip(&models).map(judged).collect::<Result<_, DiagnoseError>>()?;
         let (plain, chi2): (Vec<_>, Vec<f64>) = judged.into_iter().unzip();
         Ok(Self { runs, plain, chi2: chi2.iter().sum() })
     }
 
-    /// The model as it is found without `run`.
-    fn without(search: &Search, model: &Model, run: usize, needs: &[&[usize]]) -> Result<Model, DiagnoseError> {
-        if search.split.judge.contains(&run) {
-            return Ok(model.clone());
-        }
-        let is_found = |index: &usize| needs.get(*index).is_none_or(|needs| !needs.contains(&run));
+    /// The model as it is found without a fold.
+    fn without(
+        search: &Search,
+        model: &Model,
+        (fold, left_out): (usize, &[usize]),
+        needs: &[&[usize]],
+    ) -> Result<Model, DiagnoseError> {
+        let is_found = |index: &usize| needs.get(*index).is_none_or(|needs| !needs.contains(&fold));
         let terms = (0..model.terms.len()).filter(is_found).map(|index| model.terms[index].clone()).collect();
-        let others: Vec<usize> = search.split.all().into_iter().filter(|other| *other != run).collect();
+        let others: Vec<usize> = search.split.all().into_iter().filter(|other| !left_out.contains(other)).collect();
         let model = Model { terms, ..model.clone() };
         // Nothing can be fitted without another run.
         if others.is_empty() || model.terms.is_empty() {
