@@ -71,6 +71,8 @@ fn near_its_off_value_an_effect_changes_little_and_further_off_more() {
                         Some(off) => {
                             off + share * if p.bounds[1] > off { (p.bounds[1] - off).min(5.0) } else { p.bounds[0] - off }
                         }
+                        // In the run at the mean of all nothing has drifted.
+                        None if p.name == "run" => 1.0,
                         None => p.default.filter(|value| value.is_finite()).unwrap_or(1.0),
                     };
                     (p.name, value)
@@ -102,6 +104,36 @@ fn limits_of_the_driver_act_beyond_them_only() {
     let slewed = |rate: f64| run(&with(CANTILEVER, "slew-limit", &[("rate_v_per_s", rate)]), &[]).recording;
     assert_eq!(slewed(2e4).positions, run(CANTILEVER, &[]).recording.positions);
     assert_ne!(slewed(1e4).positions, run(CANTILEVER, &[]).recording.positions);
+}
+
+#[test]
+fn a_drift_is_a_factor_of_its_run_and_none_in_the_mean_run() {
+    for (drift, constant) in [("gain-drift", "actuation-gain"), ("stiffness-drift", "stiffness")] {
+        let of = |run_: f64| run(&with(CANTILEVER, drift, &[("per_run", 0.05), ("run", run_)]), &[]).recording;
+        for (place, scale) in [(2.0, 1.1), (-2.0, 0.9)] {
+            assert_eq!(of(place), run(&with(CANTILEVER, constant, &[("scale", scale)]), &[]).recording, "{drift} {place}");
+        }
+        assert_eq!(of(0.0), run(CANTILEVER, &[]).recording, "{drift}");
+    }
+}
+
+#[test]
+fn a_remanent_offset_holds_the_tip_where_the_same_voltage_would() {
+    // At 0 V after −1500 V: a tenth of what lies beyond 500 V has stayed.
+    let sequence = |volts: &str, end: f64| {
+        CANTILEVER.replace(
+            "waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5",
+            &format!("waveform = \"sequence\"\nphases = [{{ until_s = 0.1, voltages_v = [0] }}, {{ until_s = 0.3, voltages_v = [{volts}] }}, {{ voltages_v = [{end:?}] }}]"),
+        )
+    };
+    let settings = ["simulation.duration_s=1.0", "robot.damping_eta=0.05"];
+    let remanence = [("share", 0.1), ("coercive_v", 500.0)];
+    let held = tip(&run(&with(&sequence("-1500", 0.0), "remanence", &remanence), &settings));
+    let driven = tip(&run(&sequence("-1500", -100.0), &settings));
+    let rest = tip(&run(&sequence("0", 0.0), &settings));
+    // The larger drive before rings a little more: by 1/15 of what is left of it.
+    assert!((held - driven).abs() < 1e-3 * (driven - rest).abs(), "{held} {driven} {rest}");
+    assert!((driven - rest).abs() > 0.1, "{driven} {rest}");
 }
 
 #[test]
@@ -275,6 +307,8 @@ fn what_cannot_be_applied_is_refused_by_name() {
         ("tip-mass", vec![("mass_g", 0.1), ("position_mm", 400.0)], "end"),
         ("weak-actuator", vec![("actuator", 2.0), ("gain", 0.5)], "1 actuators"),
         ("stiffness", vec![("scale", f64::NAN)], "between"),
+        ("gain-drift", vec![("per_run", 0.1), ("run", -9.5)], "at least 0.1"),
+        ("stiffness-drift", vec![("per_run", -0.1), ("run", 1e5)], "at least 0.1"),
     ] {
         let error = experiment::experiment(&Source::from_text("x.toml", with(CANTILEVER, id, &values))).unwrap_err().to_string();
         assert!(error.contains(word) && error.contains("x.toml"), "{id}: {error}");
@@ -294,6 +328,10 @@ fn both_engines_bend_alike() {
         ("structural-damping", vec![("loss_factor", 0.05)]),
         ("passive-margin", vec![("fraction", 0.2)]),
         ("stiffness", vec![("scale", 1.2)]),
+        ("stiffness-drift", vec![("per_run", 0.05), ("run", -3.0)]),
+        ("gain-drift", vec![("per_run", 0.05), ("run", 3.0)]),
+        ("remanence", vec![("share", 0.2), ("saturation_v", 60.0)]),
+        ("wake-up", vec![("change", -0.2), ("path_kv", 1.0)]),
     ] {
         let text = with(CANTILEVER, id, &values);
         let on = |engine: &str, step: &str| {
@@ -311,6 +349,7 @@ fn both_engines_bend_alike() {
 fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     let text = with(&with(CANTILEVER, "hysteresis", &[("width", 0.2)]), "creep", &[("per_decade", 0.02)]);
     let text = with(&with(&text, "driver-lag", &[("time_constant_s", 0.01)]), "structural-damping", &[("loss_factor", 0.02)]);
+    let text = with(&with(&text, "remanence", &[("share", 0.1), ("coercive_v", 300.0)]), "wake-up", &[("change", -0.1)]);
     let experiment =
         experiment::experiment(&Source::from_text("test", with(&text, "dry-friction", &[("moment_mn_m", 0.1)]))).unwrap();
     let mut whole = experiment.engine().unwrap();

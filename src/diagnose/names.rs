@@ -14,6 +14,8 @@ pub fn cause(id: &str) -> String {
         "discretisation" => "number of joints".into(),
         "clamp-compliance" => "compliance of the clamp".into(),
         "stiffness-softening" => "softening of the stiffness".into(),
+        "stiffness-drift" => "drift of the stiffness".into(),
+        "gain-drift" => "drift of the curvature per volt".into(),
         _ => id.replace('-', " "),
     }
 }
@@ -56,6 +58,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         "air-drag" | "stiffness-softening" | "structural-damping" | "polarity-asymmetry" => {
             fitted.nth(1).map_or("", |_| "with an exponent").into()
         }
+        "remanence" => fitted.nth(2).map_or("", |_| "that saturates").into(),
         "dry-friction" => fitted.nth(1).map_or("", |_| "with presliding").into(),
         "clamp-compliance" => match fitted.nth(1) {
             Some("hardening_per_rad") => "that hardens".into(),
@@ -96,6 +99,12 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("creep", "per_decade") => "growth in a decade of time".into(),
         ("creep", "fastest_s") => "fastest time constant".into(),
         ("creep", "power") => "exponent of the growth".into(),
+        ("remanence", "share") => "share of the voltage that stays".into(),
+        ("remanence", "coercive_v") => "coercive voltage".into(),
+        ("remanence", "saturation_v") => "largest offset".into(),
+        ("wake-up", "change") => "change of the gain at the start".into(),
+        ("wake-up", "path_kv") => "path of the voltage to 1/e of it".into(),
+        (_, "per_run") => "change from run to run".into(),
         ("passive-margin", _) => "passive share of an actuator".into(),
         ("field-dependent-gain", "slope_per_kv") => "slope of the gain".into(),
         ("field-dependent-gain", "curvature_per_kv2") => "curvature of the gain".into(),
@@ -200,7 +209,7 @@ mod tests {
     #[test]
     fn every_form_of_a_cause_has_a_label_of_its_own() {
         for preset in ["cantilever-dc", "static-shape"] {
-            let mut labels: Vec<String> = candidates(&Bench::new(&robot(preset), 2), &Visited::NOTHING)
+            let mut labels: Vec<String> = candidates(&Bench::new(&robot(preset), 2, 5), &Visited::NOTHING)
                 .iter()
                 .map(|c| with_form(c.id, &form(c.id, &c.fixed, c.parameters.iter().map(|p| p.name))))
                 .collect();

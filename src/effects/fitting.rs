@@ -124,16 +124,19 @@ pub struct Bench {
     pub actuators: usize,
     /// Number of markers.
     pub markers: usize,
+    /// Number of measured runs.
+    pub runs: usize,
 }
 
 impl Bench {
-    /// A robot with a number of `markers`.
-    pub fn new(robot: &Robot, markers: usize) -> Self {
+    /// A robot with a number of `markers` that was measured in a number of `runs`.
+    pub fn new(robot: &Robot, markers: usize, runs: usize) -> Self {
         Self {
             is_clamped: robot.mount == Mount::Clamped,
             is_on_floor: robot.mount == Mount::Ground,
             actuators: robot.actuators,
             markers,
+            runs,
         }
     }
 }
@@ -202,6 +205,11 @@ pub mod fits {
     /// With several actuators: one alone cannot tell the effect from the gain of all.
     pub fn several_actuators(bench: &Bench) -> bool {
         bench.actuators > 1
+    }
+
+    /// With more than two runs: any two differ by a drift.
+    pub fn several_runs(bench: &Bench) -> bool {
+        bench.runs > 2
     }
 
     /// With a visible shape: the tip alone cannot tell the effect from the gain.
