@@ -1,7 +1,9 @@
 //! Mounting and structure: clamp, added mass, shape, stiffness and losses.
 
 mod air_drag;
+mod cable_drag;
 mod clamp_compliance;
+mod clamp_shift;
 mod dry_friction;
 mod free_drag;
 mod free_joint_memory;
@@ -16,7 +18,9 @@ mod structural_damping;
 mod tip_mass;
 
 pub use air_drag::AIR_DRAG;
+pub use cable_drag::CABLE_DRAG;
 pub use clamp_compliance::CLAMP_COMPLIANCE;
+pub use clamp_shift::CLAMP_SHIFT;
 pub use dry_friction::DRY_FRICTION;
 pub use free_drag::FREE_DRAG;
 pub use free_joint_memory::FREE_JOINT_MEMORY;
