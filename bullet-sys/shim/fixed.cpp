@@ -6,7 +6,7 @@ namespace bs {
 
 static constexpr int ROWS = 6;
 static constexpr int BASE = -1;
-static constexpr int TURN_ABOUT_Y = 4;  // of the rows
+static constexpr int SHIFT_IN_Z = 2, TURN_ABOUT_Y = 4;  // of the rows
 
 FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world)
     : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), btVector3(0, 0, 0), world.getOrigin(),
@@ -24,7 +24,7 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
                                            const btContactSolverInfo &info) {
   btMultiBody *body = m_bodyA;
   // A compliance is none of Bullet's.
-  if ((AS_SHIPPED && compliance_ == 0) || !chain_.read(*body)) {
+  if ((AS_SHIPPED && compliance_ == 0 && shift_compliance_ == 0) || !chain_.read(*body)) {
     return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
   }
 
@@ -89,6 +89,13 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
       out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
       out.m_cfm = softness * out.m_jacDiagABInv;
       out.m_rhs = (velocity - error * moment / whole) * out.m_jacDiagABInv;
+    }
+    if (shift_compliance_ > 0 && i == SHIFT_IN_Z) {
+      const btScalar whole = info.m_timeStep + shift_damping_time_;
+      const btScalar softness = shift_compliance_ / (info.m_timeStep * whole);
+      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
+      out.m_cfm = softness * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - error / whole) * out.m_jacDiagABInv;
     }
     out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;

@@ -13,7 +13,7 @@ namespace bs {
 //
 // With a compliance c the base turns about its y axis as a spring lets it, at a pivot of its own. The row of that turn is so soft that its
 // impulse is that of the spring and its damper at the step's end, -h (phi + (h + T) omega) / c: implicit Euler, stable for any c and T, rigid in
-// the limit.
+// the limit. With a shift compliance it gives in z alike, under the force on it.
 class FixedConstraint : public btMultiBodyFixedConstraint {
  public:
   FixedConstraint(btMultiBody *body, const btTransform &world);
@@ -23,6 +23,12 @@ class FixedConstraint : public btMultiBodyFixedConstraint {
   btScalar compliance() const { return compliance_; }
   btScalar damping_time() const { return damping_time_; }
   btScalar hardening() const { return hardening_; }
+  btScalar shift_compliance() const { return shift_compliance_; }
+  btScalar shift_damping_time() const { return shift_damping_time_; }
+  void set_shift(btScalar compliance, btScalar damping_time) {
+    shift_compliance_ = compliance;
+    shift_damping_time_ = damping_time;
+  }
   void createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data, const btContactSolverInfo &info) override;
 
  private:
@@ -30,6 +36,8 @@ class FixedConstraint : public btMultiBodyFixedConstraint {
   btScalar compliance_ = 0;    // of the turn about y (rad/(dyn cm))
   btScalar damping_time_ = 0;  // its damping over its stiffness (s)
   btScalar hardening_ = 0;     // a of its moment phi (1 + (a phi)^2) / compliance (1/rad)
+  btScalar shift_compliance_ = 0;    // of the shift in z (cm/dyn)
+  btScalar shift_damping_time_ = 0;  // its damping over its stiffness (s)
 };
 
 }  // namespace bs

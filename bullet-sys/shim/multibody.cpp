@@ -235,6 +235,23 @@ int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pi
   });
 }
 
+int32_t bs_constraint_shift_set(bs_world *world, int32_t body, double compliance, double damping_time, char *error, int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(world != nullptr, "null pointer");
+    require(compliance > 0 && std::isfinite(compliance), "a compliance must be positive and finite");
+    require(damping_time >= 0 && std::isfinite(damping_time), "a damping time must not be negative, and finite");
+    btMultiBody &multibody = world->multibody(body);
+    require(is_chain(multibody), "a tie that gives needs a chain");
+    bool found = false;
+    for (const auto &constraint : world->constraints) {
+      if (constraint->getMultiBodyA() != &multibody) continue;
+      constraint->set_shift(compliance, damping_time);
+      found = true;
+    }
+    require(found, "the body is not tied");
+  });
+}
+
 int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length) {
   return bs::guarded(nullptr, 0, [&] {
     require(world != nullptr && angles != nullptr && rates != nullptr, "null pointer");

@@ -61,7 +61,7 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
         config.effect.push(EffectConfig { id: "discretisation".into(), parameters });
     }
     for term in &model.terms {
-        let Ok(applied) = plant.applied(term) else { continue };
+        let Ok(applied) = plant.applied_in(term, run) else { continue };
         let pairs = applied.effect.parameters.iter().zip(&applied.values);
         let parameters = pairs.filter(|(_, v)| v.is_finite()).map(|(p, v)| (p.name.to_owned(), *v)).collect();
         config.effect.push(EffectConfig { id: applied.effect.id.into(), parameters });

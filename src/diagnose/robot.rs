@@ -169,7 +169,7 @@ impl RobotPlant {
             Visit { robot, start, drive, step: *step, steps: self.steps_of(run, *step) }
         };
         let visits: Vec<_> = (0..self.runs.len()).map(visit).collect();
-        let bench = effects::Bench::new(&self.robot, self.markers.len());
+        let bench = effects::Bench::new(&self.robot, self.markers.len(), self.runs.len());
         // A nominal model that cannot be simulated is reported by the first prediction.
         let mut all = visited(&visits).map_or(Vec::new(), |visited| candidates(&bench, &visited));
         if self.without_voltage {
@@ -254,8 +254,8 @@ impl RobotPlant {
             let position = robot.material.actuator_length * robot.actuators as f64;
             robot.extensions.point_masses.push(PointMass { mass: scene.added, position });
         }
-        let Setup { robot, drive, chain, view } =
-            self.setup(robot, &model.terms, model.resolution, scene.drive.clone(), scene.duration)?;
+        let effects = model.terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
+        let Setup { robot, drive, chain, view } = setup(robot, &effects, model.resolution, scene.drive.clone(), scene.duration)?;
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
         let step = self.runs.iter().map(|run| run.step).fold(1e-3, f64::min);
         let start = if scene.hung > 0.0 { Start::Hung(scene.hung) } else { Start::Settled };
@@ -277,6 +277,14 @@ impl RobotPlant {
         let effect = effects::find(candidate.id).ok_or_else(|| EffectError::Unknown(candidate.id.into()))?;
         let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name, p.value(*x)));
         Ok(effect.with(free.chain(candidate.fixed.iter().copied()))?)
+    }
+
+    /// The effect of a term in a run: what drifts from run to run does so in the order of the data set, about the mean of all runs.
+    ///
+    /// # Errors
+    /// As [`applied`](Self::applied).
+    pub fn applied_in(&self, term: &Term, run: usize) -> Result<Applied, DiagnoseError> {
+        Ok(self.applied(term)?.in_run(run as f64 - 0.5 * (self.runs.len() as f64 - 1.0)))
     }
 }
 
@@ -389,24 +397,16 @@ struct Setup {
     view: View,
 }
 
-impl RobotPlant {
-    /// The robot with the terms and joints of a model, driven by `command` for `duration` (s).
-    fn setup(
-        &self,
-        mut robot: Robot,
-        terms: &[Term],
-        resolution: f64,
-        command: Table,
-        duration: f64,
-    ) -> Result<Setup, DiagnoseError> {
-        let effects = terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
-        robot.motors_per_actuator = resolution as usize;
-        let mut drive = Drive { waveform: Waveform::Table(command), positive_gain: 1.0, delay: 0.0 };
-        effects::apply(&effects, &mut robot, &mut drive)?;
-        let chain = SignalChain::new(&effects, robot.actuators, duration);
-        Ok(Setup { robot, drive, chain, view: View::new(&effects) })
-    }
+/// The robot with `effects` and a number of joints, driven by `command` for `duration` (s).
+fn setup(mut robot: Robot, effects: &[Applied], resolution: f64, command: Table, duration: f64) -> Result<Setup, DiagnoseError> {
+    robot.motors_per_actuator = resolution as usize;
+    let mut drive = Drive { waveform: Waveform::Table(command), positive_gain: 1.0, delay: 0.0 };
+    effects::apply(effects, &mut robot, &mut drive)?;
+    let chain = SignalChain::new(effects, robot.actuators, duration);
+    Ok(Setup { robot, drive, chain, view: View::new(effects) })
+}
 
+impl RobotPlant {
     fn predict_with(
         &self,
         terms: &[Term],
@@ -416,12 +416,13 @@ impl RobotPlant {
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
         let Run { robot, markers, command, start, response, has_clock, .. } = &self.runs[run];
+        let effects = terms.iter().map(|term| self.applied_in(term, run)).collect::<Result<Vec<_>, _>>()?;
         if let Some(response) = response {
-            return self.respond(response, &self.runs[run], terms, resolution, nuisance, step);
+            return self.respond(response, &self.runs[run], &effects, resolution, nuisance, step);
         }
         let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
         let Setup { robot, drive, chain, view } =
-            self.setup(robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
+            setup(robot.clone(), &effects, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
         // Channels share their times.
         let mut times = signal.times.clone();
@@ -457,7 +458,7 @@ impl RobotPlant {
         &self,
         response: &Response,
         run: &Run,
-        terms: &[Term],
+        effects: &[Applied],
         resolution: f64,
         nuisance: &Nuisance,
         step: f64,
@@ -469,7 +470,7 @@ impl RobotPlant {
             let sine = Sine::new(response, *frequency, &run.robot, first, applied);
             let duration = sine.duration();
             let Setup { robot, drive, chain, view } =
-                self.setup(run.robot.clone(), terms, resolution, sine.table.clone(), duration)?;
+                setup(run.robot.clone(), effects, resolution, sine.table.clone(), duration)?;
             let tracks = track(&robot, &run.start, &drive, chain, step, marker, &sine.times(-view.delay))?;
             let samples: Vec<f64> = tracks.into_iter().map(|at| 10.0 * view.of(at)[response.channel % 2]).collect();
             Ok(sine.parts(&samples, self.exposure))

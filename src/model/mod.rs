@@ -20,8 +20,8 @@ pub mod units;
 
 pub use curve::{CURVE_POINTS, Curve};
 pub use extensions::{
-    AIR_DENSITY, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, Slip, StickSlip,
-    VISCOUS_REACH,
+    AIR_DENSITY, ATTACHMENT_RATE, Attachment, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS,
+    LOSS_TIMES, PointMass, Slip, StickSlip, VISCOUS_REACH,
 };
 pub use laminate::{Laminate, Material};
 pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment, box_inertia};

@@ -127,7 +127,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
     let plant = Numbers {
         dataset,
         signals: signals.collect(),
-        candidates: candidates(&Bench::new(&dataset.robot, 1), &Visited::NOTHING),
+        candidates: candidates(&Bench::new(&dataset.robot, 1, 1), &Visited::NOTHING),
     };
     let runs: Vec<usize> = (0..plant.signals.len()).collect();
     let estimator = Estimator::new(&plant);

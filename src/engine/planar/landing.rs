@@ -56,7 +56,7 @@ impl PlanarEngine {
             return;
         }
         self.time_step = time_step;
-        set_implicit(&mut self.quads, &self.joint, self.base_joint, self.weight, time_step);
+        set_implicit(&mut self.quads, &self.joint, &mut self.base_joint, self.weight, time_step);
         if let Some(extensions) = &mut self.extensions {
             extensions.set_time_step(time_step, &self.quads);
         }

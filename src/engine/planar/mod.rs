@@ -45,6 +45,7 @@
 //! Eng. 39 (1996) (time stepping with complementarity). M. Anitescu, Math. Program. 105 (2006) (the convex model). A. Castro et al., arXiv
 //! 2110.10107 (regularised cones and Newton's method).
 
+mod attachment;
 mod contact;
 mod floor;
 mod interface;
@@ -65,6 +66,7 @@ mod step;
 use fearless_simd::Level;
 use wide::f64x2;
 
+use self::attachment::Attachments;
 use self::floor::{Floor, Surface};
 use self::joint_extensions::JointExtensions;
 use self::lanes::Lanes;
@@ -72,7 +74,7 @@ use self::law::ContactLaw;
 pub use self::law::FrictionModel;
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::quad::Quad;
-use self::recursion::{BLOCK, BaseJoint, Distal};
+use self::recursion::{BLOCK, BaseJoint, Distal, Slide};
 use self::step::{set_implicit, weight_of};
 use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, LARGEST_FRICTION, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -95,6 +97,7 @@ pub struct PlanarEngine {
     rest_angles: Vec<f64>,
     gains: Vec<f64>,
     extensions: Option<JointExtensions>,
+    attachments: Option<Attachments>,
     time_step: f64,
     gravity: f64,
     /// Acceleration by gravity along x and z (cm/s²).
@@ -175,15 +178,22 @@ impl PlanarEngine {
         let levels = root.max(count - 1 - root) + 1;
         let blocks = if robot.mount == Mount::Ground && levels > LONGEST_WHOLE { levels.div_ceil(BLOCK) } else { 0 };
         let (mut quads, frictions) = bodies_in_quads(robot, &segments, &bodies, root, levels);
-        let base_joint = match robot.mount {
+        let mut base_joint = match robot.mount {
+            Mount::Clamped if extensions.clamp_shift > 0.0 => BaseJoint::Sliding(Slide {
+                hinge: (extensions.clamp_compliance > 0.0).then_some(extensions.clamp_damping),
+                stiffness: 1.0 / extensions.clamp_shift,
+                damping_time: extensions.clamp_shift_damping,
+                implicit: 0.0,
+                impulse: 0.0,
+            }),
             Mount::Clamped if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged { damping_time: extensions.clamp_damping },
             Mount::Clamped => BaseJoint::Clamped,
             _ => BaseJoint::Free,
         };
-        if let BaseJoint::Hinged { .. } = base_joint {
+        if base_joint.hinge().is_some() {
             quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
-        set_implicit(&mut quads, &joint, base_joint, weight, time_step);
+        set_implicit(&mut quads, &joint, &mut base_joint, weight, time_step);
         let m = robot.motors_per_actuator;
         let rest_angles =
             extensions.rest_curvature.iter().flat_map(|curvature| vec![curvature * robot.link_length(); m]).collect();
@@ -196,6 +206,7 @@ impl PlanarEngine {
             rest_angles,
             gains: extensions.joint_gains.clone(),
             extensions: JointExtensions::new(extensions, robot.material.width, robot.link_length(), time_step, &quads),
+            attachments: Attachments::new(robot, root),
             time_step,
             gravity: robot.material.gravity,
             gravity_vector: gravity_vector(robot.material.gravity, extensions.slope),
@@ -258,6 +269,15 @@ impl PlanarEngine {
 
     fn clamped(&self) -> bool {
         self.mount == Mount::Clamped
+    }
+
+    /// Velocity in z of a clamped root's reference point (cm/s): none unless the clamp gives.
+    fn slide_velocity(&self) -> f64 {
+        let root = &self.quads[0];
+        match self.base_joint {
+            BaseJoint::Sliding(_) => root.motion[2].lane(0) - root.motion[0].lane(0) * root.half[0].lane(0),
+            _ => 0.0,
+        }
     }
 
     /// One number of body `i`.

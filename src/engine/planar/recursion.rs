@@ -187,6 +187,46 @@ pub(super) enum BaseJoint {
         /// Damping over stiffness (s).
         damping_time: f64,
     },
+    /// By a spring and a damper in z at its reference point, and rigidly or by a hinge.
+    Sliding(Slide),
+}
+
+/// A spring and a damper between the world and the root's reference point, in z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Slide {
+    /// Damping over stiffness of a hinge (s), if there is one.
+    pub(super) hinge: Option<f64>,
+    /// Stiffness (dyn/cm), and damping over it (s).
+    pub(super) stiffness: f64,
+    pub(super) damping_time: f64,
+    /// What they add to the articulated inertia in a step (g), and their impulse at its start (dyn·s).
+    pub(super) implicit: f64,
+    pub(super) impulse: f64,
+}
+
+impl BaseJoint {
+    /// Damping over stiffness (s) of the root's hinge, if it has one.
+    pub(super) fn hinge(self) -> Option<f64> {
+        match self {
+            Self::Hinged { damping_time } => Some(damping_time),
+            Self::Sliding(Slide { hinge, .. }) => hinge,
+            _ => None,
+        }
+    }
+}
+
+impl Slide {
+    /// Turn and shift of the root under the whole chain.
+    fn motion(&self, whole: &Articulated, root: &Quad) -> Spatial {
+        let [turning, _, coupling, .., sinking] = whole.inertia;
+        let (sinking, down) = (sinking + self.implicit, whole.force[2] + self.impulse);
+        if self.hinge.is_none() {
+            return [0.0, 0.0, down / sinking];
+        }
+        let (turning, moment) = (turning + root.implicit.lane(0), whole.force[0] + root.torque.lane(0));
+        let determinant = turning * sinking - coupling * coupling;
+        [(moment * sinking - coupling * down) / determinant, 0.0, (turning * down - coupling * moment) / determinant]
+    }
 }
 
 /// Tree levels of a block; an even number. A part of a long chain is a run of blocks.
@@ -212,14 +252,17 @@ fn root_motion<const SKEW: bool>(
         return Default::default();
     }
     let mut whole = chain.at_root::<SKEW>(through, root);
-    if let BaseJoint::Hinged { .. } = base_joint {
-        let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
-        return (whole, [turn, 0.0, 0.0]);
-    }
     if let Some(by) = contact.take(0) {
         (0..6).for_each(|k| whole.inertia[k] += by.inertia[k].to_array()[0]);
         (0..3).for_each(|k| whole.lower[k] += by.lower[k].to_array()[0]);
         (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
+    }
+    if let BaseJoint::Hinged { .. } = base_joint {
+        let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
+        return (whole, [turn, 0.0, 0.0]);
+    }
+    if let BaseJoint::Sliding(slide) = base_joint {
+        return (whole, slide.motion(&whole, root));
     }
     (whole, whole.motion::<SKEW>())
 }

@@ -12,6 +12,7 @@ use super::contact::FrictionCone;
 use super::lanes::{Four, Lanes, Two, inner};
 use super::law::ContactLaw;
 use super::quad::{Quad, direction};
+use super::recursion::BaseJoint;
 use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
@@ -51,7 +52,12 @@ impl PlanarEngine {
         }
         self.velocity = [0.0; 2];
         self.finite = false;
+        let base_joint = self.base_joint;
+        if let BaseJoint::Sliding(slide) = &mut self.base_joint {
+            slide.implicit = slide.stiffness;
+        }
         let settled = dispatch!(self.level, simd => self.settle_in_steps(simd, &dynamic));
+        self.base_joint = base_joint;
         for (quad, real) in self.quads.iter_mut().zip(&dynamic) {
             (quad.mass, quad.inertia, quad.implicit) = (real.mass, real.inertia, real.implicit);
             quad.inertia_at_reference = real.inertia_at_reference;
@@ -88,6 +94,14 @@ impl PlanarEngine {
                 }
                 before = last;
             }
+            if let BaseJoint::Sliding(slide) = &mut self.base_joint {
+                slide.impulse = -slide.stiffness * self.centre[1];
+            }
+            let height = if self.clamped() { self.centre[1] } else { self.root_motion(simd)[0][1] };
+            if let Some(attachments) = &mut self.attachments {
+                attachments.begin(&self.quads, height);
+                attachments.load_at_rest();
+            }
             self.find_corners(simd, &law);
             self.solve_on_floor(simd, &law)?;
             let turns = self.quads.iter().flat_map(|quad| quad.mean[0].to_array());
@@ -109,6 +123,8 @@ impl PlanarEngine {
             let rise = Lanes::from(rise).sum();
             if self.mount != Mount::Clamped {
                 self.centre[1] += share * rise;
+            } else if let BaseJoint::Sliding(_) = self.base_joint {
+                self.centre[1] += share * self.quads[0].mean[2].lane(0);
             }
             if largest <= SETTLED && rise.abs() <= SETTLED {
                 return Ok(true);
