@@ -56,8 +56,8 @@ struct Weighed {
 fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<Weighed, DiagnoseError> {
     (search.progress)(&format!("the gain of {}", search.id(best.model().terms[index].candidate)));
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
-    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index))?;
     let mut tied_with = ties.of(search, best, index);
+    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index), &tied_with)?;
     tied_with.extend(pair_in_place(search, best, (&without, &screened), index, &tied_with)?);
     Ok(Weighed { without, standing, tied_with })
 }

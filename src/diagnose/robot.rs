@@ -6,7 +6,7 @@ use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
 use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
-use super::plant::{Candidate, FreeCurve, Model, Nuisance, Plant, Signal, Term};
+use super::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::response::Sine;
 use super::track::{ON_STEP, track};
@@ -275,7 +275,14 @@ impl RobotPlant {
     pub fn applied(&self, term: &Term) -> Result<Applied, DiagnoseError> {
         let candidate = &self.candidates[term.candidate];
         let effect = effects::find(candidate.id).ok_or_else(|| EffectError::Unknown(candidate.id.into()))?;
-        let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name, p.value(*x)));
+        // Limits beyond the range that files may give limit nothing: a fit comes near to where the effect vanishes, at infinity.
+        let within = |name: &str, value: f64| {
+            let known = effect.parameters.iter().find(|p| p.name == name)?;
+            let is_beyond = known.off.is_some_and(f64::is_infinite) && !(known.bounds[0]..=known.bounds[1]).contains(&value);
+            if is_beyond { known.off } else { Some(value) }
+        };
+        let value = |(p, x): (&Free, &f64)| (p.name, within(p.name, p.value(*x)).unwrap_or(p.value(*x)));
+        let free = candidate.parameters.iter().zip(&term.x).map(value);
         Ok(effect.with(free.chain(candidate.fixed.iter().copied()))?)
     }
 

@@ -26,7 +26,8 @@ pub(super) struct Standing {
     pub(super) is_left_by_law: bool,
 }
 
-/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by linear estimates.
+/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by linear estimates. In
+/// the folds of a cross-validation those that it is `tied` with are no rivals: they would predict the same.
 ///
 /// # Errors
 /// [`DiagnoseError`] if the model cannot be simulated.
@@ -36,6 +37,7 @@ pub(super) fn standing(
     without: &Scored,
     index: usize,
     fitted: &[&Trial],
+    tied: &[String],
 ) -> Result<(Standing, Screened), DiagnoseError> {
     // Free forms count in the stead of constants only.
     let is_constant = search.candidate(&best.model().terms[index]).is_constant;
@@ -48,10 +50,10 @@ pub(super) fn standing(
     }
     let contest = Contest::new(search, best, without, index, &screened, fitted);
     let resamples: Vec<[usize; 2]> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).collect();
-    let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..])).count();
+    let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..], &[])).count();
     let places = |fold: &[usize]| -> Vec<usize> { (0..runs.len()).filter(|at| fold.contains(&runs[*at])).collect() };
     let folds = search.split.folds();
-    let is_lost_without = |fold: &usize| !contest.chooses(&places(&folds[*fold]));
+    let is_lost_without = |fold: &usize| !contest.chooses(&places(&folds[*fold]), tied);
     let standing = Standing {
         stability: Some(chosen as f64 / resamples.len() as f64),
         needs: (0..folds.len()).filter(is_lost_without).collect(),
@@ -90,10 +92,10 @@ struct Contest {
     own: Vec<f64>,
     /// ... and the parts of its linear estimate.
     own_parts: Vec<[f64; 2]>,
-    /// Fall of χ² in each run by each rival that was fitted.
-    fitted: Vec<Vec<f64>>,
-    /// Parts of the linear estimate of each other rival.
-    linear: Vec<Vec<[f64; 2]>>,
+    /// Rivals that were fitted: name, and fall of χ² in each run.
+    fitted: Vec<(&'static str, Vec<f64>)>,
+    /// Other rivals: name, and parts of the linear estimate.
+    linear: Vec<(&'static str, Vec<[f64; 2]>)>,
 }
 
 impl Contest {
@@ -122,24 +124,29 @@ impl Contest {
             counts: runs.iter().map(|run| search.estimator.count(&[*run]) as f64).collect(),
             own: falls(best),
             own_parts: of(&column),
-            fitted: fitted.iter().filter(|trial| is_rival(trial.candidate)).map(|trial| falls(&trial.scored)).collect(),
+            fitted: fitted
+                .iter()
+                .filter(|trial| is_rival(trial.candidate))
+                .map(|trial| (search.id(trial.candidate), falls(&trial.scored)))
+                .collect(),
             linear: screened
                 .columns
                 .iter()
                 .filter(|(term, column)| is_linear(term, column))
-                .map(|(_, column)| of(column))
+                .map(|(term, column)| (search.id(term.candidate), of(column)))
                 .collect(),
         }
     }
 
-    /// True if the cause lowers χ² most of all without the runs `left_out` (by their places in the list of runs), and visibly.
-    fn chooses(&self, left_out: &[usize]) -> bool {
+    /// True if the cause lowers χ² most of all but those it is `tied` with, without the runs `left_out` (by their places in the list of runs), and visibly.
+    fn chooses(&self, left_out: &[usize], tied: &[String]) -> bool {
         let weights: Vec<f64> = (0..self.counts.len()).map(|run| if left_out.contains(&run) { 0.0 } else { 1.0 }).collect();
         let sum = |values: &[f64]| -> f64 { values.iter().zip(&weights).map(|(value, weight)| weight * value).sum() };
         let (own, linear) = (sum(&self.own), fall(&self.own_parts, &weights));
+        let is_tied = |id: &str| tied.iter().any(|tied| tied == id);
         own.max(linear) > LEAST_GAIN * sum(&self.counts)
-            && self.fitted.iter().all(|falls| sum(falls) < own)
-            && self.linear.iter().all(|parts| fall(parts, &weights) < linear)
+            && self.fitted.iter().all(|(id, falls)| is_tied(id) || sum(falls) < own)
+            && self.linear.iter().all(|(id, parts)| is_tied(id) || fall(parts, &weights) < linear)
     }
 }
 
