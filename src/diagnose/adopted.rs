@@ -11,6 +11,7 @@ use super::stability::{Standing, standing};
 use super::ties::{Ties, pair_in_place};
 use super::unseen::Unseen;
 use super::verdict::Judged;
+use crate::effects::Place;
 
 /// Causes are minor that together remove no more than this share, ...
 const MINOR_SHARE: f64 = 0.02;
@@ -203,7 +204,7 @@ fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted 
     Adopted {
         id: "discretisation".into(),
         kind: "numerics".into(),
-        place: "discretisation".into(),
+        place: Place::Discretisation.name().into(),
         cause: "Finitely many joints and a finite time step stand for a continuum.".into(),
         parameters: vec![Estimate {
             name: "motors_per_actuator".into(),

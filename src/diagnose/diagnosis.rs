@@ -42,7 +42,7 @@ pub struct Estimate {
 pub enum JudgedBy {
     /// Runs that neither fit nor selection saw.
     JudgeRuns,
-    /// Each run in turn, left out of selection and fit: there are too few runs to keep some.
+    /// Each of four folds of the runs in turn, left out of selection and fit: there are too few runs to keep some.
     CrossValidation,
 }
 
@@ -81,7 +81,7 @@ pub struct Adopted {
     pub curve: Option<Curve>,
     /// The named causes that were tried in the stead of the place's free form, nearest first.
     pub nearest: Vec<Nearest>,
-    /// Share of the held-out χ² above the noise that it removes (0 to 1).
+    /// Share of χ² above the noise that it removes from the runs that judge (0 to 1).
     pub gain_heldout: f64,
     /// Parameters that were given: name and value.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -112,7 +112,7 @@ pub struct Curve {
 pub struct Nearest {
     /// Its name.
     pub id: String,
-    /// Share of what the free form takes on held-out runs that it leaves (0 to 1).
+    /// Share of what the free form takes on select runs that it leaves (0 to 1).
     pub left: f64,
 }
 
@@ -134,9 +134,9 @@ pub struct RunError {
 pub struct Stage {
     /// Root mean square residual of all runs (mm).
     pub rmse_mm: f64,
-    /// Root mean square residual of the held-out runs (mm).
+    /// Root mean square residual of the runs that judge, or of the folds of the cross-validation (mm).
     pub rmse_heldout_mm: f64,
-    /// Its 95 % confidence interval (mm), by a jackknife over held-out runs.
+    /// Its 95 % confidence interval (mm), by a jackknife over these runs.
     pub rmse_heldout_ci95_mm: [f64; 2],
     /// Errors of each run.
     pub runs: Vec<RunError>,
@@ -154,7 +154,7 @@ pub struct Ranked {
     /// Its form, for causes with several.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub form: String,
-    /// Root mean square residual of the held-out runs with it (mm).
+    /// Root mean square residual of the select runs with it (mm).
     pub rmse_heldout_mm: f64,
     /// Change of BIC against re-tuned constants alone; negative is better.
     pub delta_bic: f64,

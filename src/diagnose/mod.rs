@@ -2,7 +2,7 @@
 //!
 //! [`dataset`] reads runs, [`quality`] estimates noise and masks outliers and frozen markers, [`voltage`] interpolates commands between rows. A
 //! [`plant`] is the measured system with its model; [`robot`] is the plant of this crate's robots. [`fit`] is bounded least squares; [`search`] selects
-//! causes on held-out runs; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
+//! causes on runs that no fit saw, by their [`split`]; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
 //! [residual tests](residual_tests) of the final model, in a [`diagnosis`]. [`protocols`] proposes the next measurement; [`report`] and [`extended`]
 //! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers.
 //!

@@ -10,7 +10,7 @@ use super::diagnosis::Nearest;
 use super::plant::{Candidate, Model, Term};
 use super::search::{PROMISING_IN_PLACE, Scored, Search};
 
-/// A name stands if it takes this share of what the free form takes on held-out runs.
+/// A name stands if it takes this share of what the free form takes on select runs.
 const LEAST_TAKEN: f64 = 0.95;
 /// Held-out runs show a place if the free form takes there this share of what it takes in all, both per value.
 const LEAST_SHOWN: f64 = 0.1;
@@ -162,7 +162,7 @@ impl<'a> Place<'a> {
         Ok(Some(alone).filter(|alone| self.taken(alone) >= LEAST_TAKEN))
     }
 
-    /// Share of what the free form takes on held-out runs that another model takes; on all runs where the held-out ones hardly show the place.
+    /// Share of what the free form takes on select runs that another model takes; on all runs where the select runs hardly show the place.
     fn taken(&self, scored: &Scored) -> f64 {
         let count = |runs: &[usize]| self.search.estimator.count(runs).max(1) as f64;
         let whole = (self.bare.total() - self.best.total()) / count(&self.search.split.all());

@@ -1,9 +1,9 @@
 //! Selection of causes: screening, forward selection, backward elimination and replacement.
 //!
-//! Models are fitted to the fit runs and judged on the held-out ones. The constants of the nominal model are free from the beginning, so that a
+//! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, selection and replacement share the state of one search; its last 120 lines are tests.
+//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 120 lines are tests.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::split::Split;
 
-/// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
+/// A cause is adopted if χ² of the select runs falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
 pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
@@ -29,7 +29,7 @@ pub(super) const VISIBLE: f64 = 0.25;
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
 const LEAST_BIC: f64 = 10.0;
-/// A cause that no held-out run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
+/// A cause that no select run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
 const SEEN_BY_FIT: f64 = 0.1;
 /// A cause whose linear estimate exceeds that by this factor is not left out on trial.
 const CLEARLY: f64 = 3.0;
@@ -102,7 +102,7 @@ pub struct Search<'a> {
     pub estimator: Estimator<'a>,
     /// The runs.
     pub split: Split,
-    /// χ² per value above 1 of re-tuned constants on the held-out runs.
+    /// χ² per value above 1 of re-tuned constants on the select runs.
     pub unexplained: f64,
     /// Models with two causes that cost more are given up; infinite for none.
     pub limit: f64,
@@ -357,7 +357,7 @@ impl Search<'_> {
         gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
     }
 
-    /// True if a free form is better than a name on held-out runs and by BIC.
+    /// True if a free form is better than a name on the select runs and by BIC.
     fn is_closer(&self, free: &Scored, named: &Scored) -> bool {
         self.judged(free) < self.judged(named) && free.bic() < named.bic() - LEAST_BIC
     }
@@ -577,7 +577,7 @@ impl Search<'_> {
         chosen
     }
 
-    /// The best screened candidates fitted on top of `from`, best on held-out runs first, and the screening.
+    /// The best screened candidates fitted on top of `from`, best on select runs first, and the screening.
     ///
     /// # Errors
     /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
@@ -601,7 +601,7 @@ impl Search<'_> {
                 trials.push(Trial { candidate: term.candidate, scored });
             }
         }
-        // Possible winners are refitted: an unconverged fit may do better on held-out runs than a converged one.
+        // Possible winners are refitted: an unconverged fit may do better on select runs than a converged one.
         let best = |by: &dyn Fn(&Scored) -> f64, free: bool| {
             let of_kind = (0..trials.len()).filter(|k| self.ends_free(trials[*k].scored.model()) == free);
             of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
@@ -622,7 +622,7 @@ impl Search<'_> {
         Ok((trials, screened))
     }
 
-    /// The criterion of ranking: χ² of the held-out runs, or BIC where there are none.
+    /// The criterion of ranking: χ² of the select runs, or BIC where there are none.
     pub fn judged(&self, scored: &Scored) -> f64 {
         if self.split.select.is_empty() { scored.bic() } else { scored.select }
     }
@@ -729,7 +729,7 @@ impl Search<'_> {
         if self.unexplained > 0.0 { left / self.unexplained } else { 1.0 }
     }
 
-    /// χ² of the held-out runs, or of the fit runs where there are none.
+    /// χ² of the select runs, or of the fit runs where there are none.
     fn chi2_to_judge_by(&self, scored: &Scored) -> (f64, &[usize]) {
         if self.split.select.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.select, &self.split.select) }
     }
@@ -764,7 +764,7 @@ impl Search<'_> {
         SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
     }
 
-    /// A cause that shows in fit runs only: the run that it improves most is held out as well, and the cause, fitted to the others, has to improve it
+    /// A cause that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
     /// too. Keeps the new split if it does.
     fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
         let named = trials.iter().filter(|trial| !self.ends_free(trial.scored.model()));

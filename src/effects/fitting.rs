@@ -69,27 +69,27 @@ impl Place {
         Self::Picture,
     ];
 
-    /// Its name in files.
+    /// Its name in files: where, and what of it.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Discretisation => "discretisation",
-            Self::Mass => "mass",
-            Self::Stiffness => "stiffness",
-            Self::Clamp => "clamp",
-            Self::RestShape => "rest-shape",
-            Self::JointMomentOfDeviation => "joint-moment-of-deviation",
-            Self::JointMomentOfRate => "joint-moment-of-rate",
-            Self::JointMemory => "joint-memory",
-            Self::VoltageCurve => "voltage-curve",
-            Self::VoltageMemory => "voltage-memory",
-            Self::Drive => "drive",
-            Self::GainAlong => "gain-along",
-            Self::Air => "air",
-            Self::Attachment => "attachment",
-            Self::FloorFriction => "floor-friction",
-            Self::Impact => "impact",
-            Self::Floor => "floor",
-            Self::Picture => "picture",
+            Self::Discretisation => "numerics/discretisation",
+            Self::Mass => "structure/mass",
+            Self::Stiffness => "structure/stiffness",
+            Self::Clamp => "mounting/clamp",
+            Self::RestShape => "structure/rest-shape",
+            Self::JointMomentOfDeviation => "joint/moment-of-deviation",
+            Self::JointMomentOfRate => "joint/moment-of-rate",
+            Self::JointMemory => "joint/memory",
+            Self::VoltageCurve => "actuation/curve-of-voltage",
+            Self::VoltageMemory => "actuation/memory-of-voltage",
+            Self::Drive => "driver/response",
+            Self::GainAlong => "actuation/gain-along",
+            Self::Air => "air/drag",
+            Self::Attachment => "mounting/attachment",
+            Self::FloorFriction => "ground/friction",
+            Self::Impact => "ground/impact",
+            Self::Floor => "ground/shape",
+            Self::Picture => "measurement/picture",
         }
     }
 
