@@ -51,6 +51,8 @@ struct Weighed {
     standing: Standing,
     /// Causes, or sets of two, that the data cannot tell from it.
     tied_with: Vec<String>,
+    /// The model with such a set.
+    pair: Option<Model>,
 }
 
 /// Weighs term `index` of `best`.
@@ -59,11 +61,22 @@ fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let mut tied_with = ties.of(search, best, index);
     let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index), &tied_with)?;
-    tied_with.extend(pair_in_place(search, best, (&without, &screened), index, &tied_with)?);
-    Ok(Weighed { without, standing, tied_with })
+    let (set, pair) = pair_in_place(search, best, (&without, &screened), index, &tied_with)?.unzip();
+    tied_with.extend(set);
+    Ok(Weighed { without, standing, tied_with, pair })
 }
 
-/// All adopted causes, the discretisation among them, with their shares and roles; and the judgement of the whole model on unseen runs.
+/// Adopted causes and the judgement of the model with all of them.
+pub(super) struct Adoption {
+    /// All causes, the discretisation among them, with their shares and roles.
+    pub(super) effects: Vec<Adopted>,
+    /// The model on the runs that judge it.
+    pub(super) unseen: Unseen,
+    /// Models with two causes in the place of one, which the data cannot tell from it.
+    pub(super) pairs: Vec<Model>,
+}
+
+/// Weighs all causes of a model.
 ///
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.
@@ -73,7 +86,7 @@ pub(super) fn adopted(
     bare: &Scored,
     causes: &Causes,
     ties: &Ties,
-) -> Result<(Vec<Adopted>, Unseen), DiagnoseError> {
+) -> Result<Adoption, DiagnoseError> {
     let best = &judged.best;
     let count = best.model().terms.len();
     let weighed: Vec<Weighed> =
@@ -87,7 +100,7 @@ pub(super) fn adopted(
     }
     let (whole, mut unstable, mut taken) = (Whole::of(search, best, bare)?, Vec::new(), Vec::new());
     taken.resize(effects.len(), 0.0);
-    for (index, Weighed { without, standing, tied_with }) in weighed.iter().enumerate() {
+    for (index, Weighed { without, standing, tied_with, .. }) in weighed.iter().enumerate() {
         let mut others = needs.clone();
         others.remove(index);
         let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others)?, search);
@@ -107,7 +120,8 @@ pub(super) fn adopted(
     }
     set_roles(&mut effects, &taken);
     set_unstable(&mut effects, &unstable);
-    Ok((effects, unseen))
+    let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
+    Ok(Adoption { effects, unseen, pairs })
 }
 
 /// Term `index` as an adopted cause, without its share and gain.

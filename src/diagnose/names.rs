@@ -4,8 +4,11 @@ use super::diagnosis::{Adopted, Estimate};
 use crate::model::{Laminate, Robot};
 use crate::number::{digits_for, fixed};
 
-/// The name of a cause.
+/// The name of a cause, or of a set of causes with plus signs between them.
 pub fn cause(id: &str) -> String {
+    if let Some((first, rest)) = id.split_once('+') {
+        return format!("{} with {}", cause(first), cause(rest));
+    }
     match id {
         "stiffness" => "bending stiffness".into(),
         "actuation-gain" => "curvature per volt".into(),

@@ -4,7 +4,7 @@
 //! doubt ([`judge`], [`doubtful`]), ties, what each cause takes and how firmly it stands ([`adopted`]), and the report of all that.
 
 use super::DiagnoseError;
-use super::adopted::{adopted, estimates};
+use super::adopted::{Adoption, adopted, estimates};
 use super::causes::{Causes, find};
 use super::combinations::combinations;
 use super::dataset::Role;
@@ -74,7 +74,7 @@ pub fn diagnose(
     let (nominal, calibrated, judged) = (nominal?, calibrated?, Judged { best: best?, ..judged });
     progress("tied causes");
     let ties = Ties::new(&search, &judged.best, &causes.replaced, causes.coarse_total);
-    let (effects, unseen) = adopted(&search, &judged, &bare, &causes, &ties)?;
+    let Adoption { effects, unseen, pairs } = adopted(&search, &judged, &bare, &causes, &ties)?;
     let insufficient = insufficient.or_else(|| if is_nothing(&effects) { doubts.first().cloned() } else { None });
     let mut remarks = doubts;
     if spikes > 0 {
@@ -92,8 +92,8 @@ pub fn diagnose(
         calibrated: &calibrated,
     };
     let verdict = verdict(&search, &judged, &effects, insufficient.is_some());
-    let models: Vec<Model> =
-        std::iter::once(judged.best.model().clone()).chain(ties.models().map(|scored| scored.model().clone())).collect();
+    let tied_models = ties.models().map(|scored| scored.model().clone()).chain(pairs);
+    let models: Vec<Model> = std::iter::once(judged.best.model().clone()).chain(tied_models).collect();
     let next_experiment = match (verdict, dropped, &insufficient) {
         (Verdict::Tied, ..) => separate(&models),
         // With and without the last cause that was dropped.

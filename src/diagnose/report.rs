@@ -265,8 +265,8 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         let tied = if others.is_empty() { String::new() } else { format!(" Tied with {}.", others.join(", ")) };
         let _ = writeln!(
             out,
-            "<p class=\"small\"><strong>{}</strong> ({}{}{}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
-             noise.{tied}</p>",
+            "<p class=\"small\"><strong>{}</strong> ({}{}{}; <code>id = \"{}\"</code> in files): {} It takes {} % of the misfit, and removes {} % of \
+             the held-out error above the noise.{tied}</p>",
             escape(&names::cause(&effect.id)),
             effect.kind,
             if effect.role == Part::Minor { "; minor" } else { "" },
@@ -275,6 +275,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
                 .map_or_else(String::new, |share| format!("; chosen in {:.0} % of resamples over runs", 100.0 * share)),
             effect.id,
             prose(&effect.cause),
+            fixed(100.0 * effect.share, 1),
             fixed(100.0 * effect.gain_heldout, 1)
         );
     }

@@ -77,8 +77,8 @@ impl Ties {
     }
 }
 
-/// Two causes together that the data cannot tell from term `index` of `best`, which `without` lacks: their ids with a plus sign; none if there are none,
-/// or if one of them is tied alone.
+/// Two causes together that the data cannot tell from term `index` of `best`, which `without` lacks: their ids with a plus sign, and the model with them;
+/// none if there are none, or if one of them is tied alone.
 ///
 /// # Errors
 /// [`DiagnoseError`] if `without` cannot be simulated.
@@ -88,7 +88,7 @@ pub(super) fn pair_in_place(
     (without, screened): (&Scored, &Screened),
     index: usize,
     tied: &[String],
-) -> Result<Option<String>, DiagnoseError> {
+) -> Result<Option<(String, Model)>, DiagnoseError> {
     let own = search.candidate(&best.model().terms[index]);
     let taken = without.total() - best.total();
     // A cause within the noise, or with several parameters of its own, is not taken apart.
@@ -104,5 +104,6 @@ pub(super) fn pair_in_place(
     let start = search.start_beyond(&pair, screened)?;
     let Ok(both) = search.fitted_at_its_spread(&start) else { return Ok(None) };
     let ids: Vec<&str> = pair.terms.iter().rev().take(2).map(|term| search.id(term.candidate)).collect();
-    Ok(search.is_tied(best, &both).then(|| format!("{}+{}", ids[1].min(ids[0]), ids[1].max(ids[0]))))
+    let set = format!("{}+{}", ids[1].min(ids[0]), ids[1].max(ids[0]));
+    Ok(search.is_tied(best, &both).then(|| (set, both.model().clone())))
 }
