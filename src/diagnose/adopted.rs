@@ -60,7 +60,7 @@ fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<
     (search.progress)(&format!("the gain of {}", search.id(best.model().terms[index].candidate)));
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let mut tied_with = ties.of(search, best, index);
-    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index), &tied_with)?;
+    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index))?;
     let (set, pair) = pair_in_place(search, best, (&without, &screened), index, &tied_with)?.unzip();
     tied_with.extend(set);
     Ok(Weighed { without, standing, tied_with, pair })

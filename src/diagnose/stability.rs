@@ -19,15 +19,14 @@ const LEFT_BY_CONSTANT: f64 = 0.02;
 pub(super) struct Standing {
     /// Share of resamples in which it is chosen; none with few runs.
     pub(super) stability: Option<f64>,
-    /// Folds of the cross-validation without which it would not be chosen.
+    /// Folds of the cross-validation without which it would not be worth it. Where a rival would be chosen, it stands for the rival.
     pub(super) needs: Vec<usize>,
     /// True for a constant in the stead of which the free form of another cause's place would do as well, and beside which it still finds something: the
     /// constant may be what the law of that cause lacks.
     pub(super) is_left_by_law: bool,
 }
 
-/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by linear estimates. In
-/// the folds of a cross-validation those that it is `tied` with are no rivals: they would predict the same.
+/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by linear estimates.
 ///
 /// # Errors
 /// [`DiagnoseError`] if the model cannot be simulated.
@@ -37,7 +36,6 @@ pub(super) fn standing(
     without: &Scored,
     index: usize,
     fitted: &[&Trial],
-    tied: &[String],
 ) -> Result<(Standing, Screened), DiagnoseError> {
     // Free forms count in the stead of constants only.
     let is_constant = search.candidate(&best.model().terms[index]).is_constant;
@@ -50,10 +48,10 @@ pub(super) fn standing(
     }
     let contest = Contest::new(search, best, without, index, &screened, fitted);
     let resamples: Vec<[usize; 2]> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).collect();
-    let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..], &[])).count();
+    let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..])).count();
     let places = |fold: &[usize]| -> Vec<usize> { (0..runs.len()).filter(|at| fold.contains(&runs[*at])).collect() };
     let folds = search.split.folds();
-    let is_lost_without = |fold: &usize| !contest.chooses(&places(&folds[*fold]), tied);
+    let is_lost_without = |fold: &usize| !contest.shows(&places(&folds[*fold]));
     let standing = Standing {
         stability: Some(chosen as f64 / resamples.len() as f64),
         needs: (0..folds.len()).filter(is_lost_without).collect(),
@@ -92,10 +90,10 @@ struct Contest {
     own: Vec<f64>,
     /// ... and the parts of its linear estimate.
     own_parts: Vec<[f64; 2]>,
-    /// Rivals that were fitted: name, and fall of χ² in each run.
-    fitted: Vec<(&'static str, Vec<f64>)>,
-    /// Other rivals: name, and parts of the linear estimate.
-    linear: Vec<(&'static str, Vec<[f64; 2]>)>,
+    /// Fall of χ² in each run by each rival that was fitted.
+    fitted: Vec<Vec<f64>>,
+    /// Parts of the linear estimate of each other rival.
+    linear: Vec<Vec<[f64; 2]>>,
 }
 
 impl Contest {
@@ -124,30 +122,39 @@ impl Contest {
             counts: runs.iter().map(|run| search.estimator.count(&[*run]) as f64).collect(),
             own: falls(best),
             own_parts: of(&column),
-            fitted: fitted
-                .iter()
-                .filter(|trial| is_rival(trial.candidate))
-                .map(|trial| (search.id(trial.candidate), falls(&trial.scored)))
-                .collect(),
+            fitted: fitted.iter().filter(|trial| is_rival(trial.candidate)).map(|trial| falls(&trial.scored)).collect(),
             linear: screened
                 .columns
                 .iter()
                 .filter(|(term, column)| is_linear(term, column))
-                .map(|(term, column)| (search.id(term.candidate), of(column)))
+                .map(|(_, column)| of(column))
                 .collect(),
         }
     }
 
-    /// True if the cause lowers χ² most of all but those it is `tied` with, without the runs `left_out` (by their places in the list of runs), and visibly.
-    fn chooses(&self, left_out: &[usize], tied: &[String]) -> bool {
-        let weights: Vec<f64> = (0..self.counts.len()).map(|run| if left_out.contains(&run) { 0.0 } else { 1.0 }).collect();
-        let sum = |values: &[f64]| -> f64 { values.iter().zip(&weights).map(|(value, weight)| weight * value).sum() };
-        let (own, linear) = (sum(&self.own), fall(&self.own_parts, &weights));
-        let is_tied = |id: &str| tied.iter().any(|tied| tied == id);
-        own.max(linear) > LEAST_GAIN * sum(&self.counts)
-            && self.fitted.iter().all(|(id, falls)| is_tied(id) || sum(falls) < own)
-            && self.linear.iter().all(|(id, parts)| is_tied(id) || fall(parts, &weights) < linear)
+    /// Weights of the runs without those `left_out` (by their places in the list of runs).
+    fn weights(&self, left_out: &[usize]) -> Vec<f64> {
+        (0..self.counts.len()).map(|run| if left_out.contains(&run) { 0.0 } else { 1.0 }).collect()
     }
+
+    /// True if the cause lowers χ² visibly without the runs `left_out`.
+    fn shows(&self, left_out: &[usize]) -> bool {
+        let weights = self.weights(left_out);
+        weighted(&self.own, &weights).max(fall(&self.own_parts, &weights)) > LEAST_GAIN * weighted(&self.counts, &weights)
+    }
+
+    /// True if the cause lowers χ² most of all without the runs `left_out`, and visibly.
+    fn chooses(&self, left_out: &[usize]) -> bool {
+        let weights = self.weights(left_out);
+        let (own, linear) = (weighted(&self.own, &weights), fall(&self.own_parts, &weights));
+        self.shows(left_out)
+            && self.fitted.iter().all(|falls| weighted(falls, &weights) < own)
+            && self.linear.iter().all(|parts| fall(parts, &weights) < linear)
+    }
+}
+
+fn weighted(values: &[f64], weights: &[f64]) -> f64 {
+    values.iter().zip(weights).map(|(value, weight)| weight * value).sum()
 }
 
 /// Per run the inner products of a column with the residuals and with itself.

@@ -1,7 +1,7 @@
 //! Errors on runs that neither parameters nor selection saw.
 //!
 //! With enough runs some are kept to judge by, and seen once, at the end. With few runs the judgement is a nested cross-validation: each fold of the runs
-//! in turn is left out, the causes that would not be chosen without it are left out as well, the parameters are fitted to all other runs, and the fold is
+//! in turn is left out, the causes that would not be worth it without it are left out as well, the parameters are fitted to all other runs, and the fold is
 //! judged.
 
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ impl Unseen {
         if search.split.judge.is_empty() { JudgedBy::CrossValidation } else { JudgedBy::JudgeRuns }
     }
 
-    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be chosen.
+    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be worth it.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
@@ -156,7 +156,7 @@ mod tests {
         // χ² is 4 (m² + 1) a run: 12 + 162 of the model, 12 + 504 without it, of which 12 are noise.
         let gain = unseen.gain_over(&Unseen::of(&search, &without, &[]).unwrap(), &search);
         assert!((gain - 342.0 / 504.0).abs() < 1e-6, "{gain}");
-        // A run without which the cause is not chosen is judged without the cause.
+        // A fold without which the cause is not worth it is judged without the cause.
         let unseen = Unseen::of(&search, &with, &[&[2]]).unwrap();
         assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 9.0).abs() < 1e-9);
     }

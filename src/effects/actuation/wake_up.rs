@@ -8,7 +8,7 @@
 //!
 //! # Parameters
 //! * `change` (–): change d of the gain at the start of a run; negative where the first cycle is smaller
-//! * `path_kv` (kV): path s_0 after which 1/e of the change is left
+//! * `path_kv` (kV): path s_0 after which 1/e of the change is left; a longer one would be another gain
 //!
 //! # Source
 //! De-aging by cycles: Genenko, Glaum, Hoffmann, Albe, Mater. Sci. Eng. B 192 (2015) 52; the exponential is from general knowledge.
@@ -34,10 +34,10 @@ pub const WAKE_UP: Effect = Effect {
         Parameter {
             name: "path_kv",
             unit: "kV",
-            bounds: [0.01, 1e4],
+            bounds: [0.01, 30.0],
             off: None,
             default: Some(3.0),
-            about: "path s_0 after which 1/e of the change is left",
+            about: "path s_0 after which 1/e of the change is left; a longer one would be another gain",
         },
     ],
     places: &[Place::VoltageMemory, Place::VoltageCurve],
