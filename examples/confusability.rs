@@ -190,6 +190,6 @@ fn is_expected(d: &Diagnosis, effects: &[String]) -> bool {
         // Some of them have a namesake in the library, with another equation.
         [id] if OUTSIDE.contains(&id) => matches!(d.verdict, Verdict::Unexplained | Verdict::Located) || is_right(d, id),
         [id] => is_right(d, id),
-        _ => d.verdict != Verdict::Unexplained && are_named(d, effects),
+        _ => !matches!(d.verdict, Verdict::Unexplained | Verdict::None) && are_named(d, effects),
     }
 }

@@ -1,7 +1,7 @@
 //! The diagnosis of a plant, from its measured runs to a [`Diagnosis`].
 //!
-//! In stages, each of which takes values and returns values: constants and noise ([`Prepared`]), causes ([`find`]), what they leave and what the data
-//! doubt ([`judge`], [`doubtful`]), ties, what each cause takes and how firmly it stands ([`adopted`]), and the report of all that.
+//! In stages, each of which takes values and returns values: constants and noise (`Prepared`), causes (`find`), what they leave and what the data
+//! doubt (`judge`, `doubtful`), ties, what each cause takes and how firmly it stands (`adopted`), and the report of all that.
 
 use super::DiagnoseError;
 use super::adopted::{Adoption, adopted, estimates};

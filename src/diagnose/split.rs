@@ -48,7 +48,7 @@ impl Split {
 ///
 /// The others are split in the same way among runs with jumps of the input and among those without: in order of the input's speed, one of every
 /// three neighbours is selected on, in turn the one with the largest and the one with the smallest range; the slowest and the fastest never are. Of two
-/// or three runs in all, the last or middle one is. Of [`LEAST_FOR_THREE_KINDS`] runs or more, of the other two of the three the one that moves less judges:
+/// or three runs in all, the last or middle one is. Of twelve runs or more, of the other two of the three the one that moves less judges:
 /// what only large motions show is left to the fit.
 pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
     let signals = plant.signals();
