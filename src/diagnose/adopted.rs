@@ -11,7 +11,6 @@ use super::stability::{Standing, standing};
 use super::ties::{Ties, pair_in_place};
 use super::unseen::Unseen;
 use super::verdict::Judged;
-use crate::effects::Place;
 
 /// Causes are minor that together remove no more than this share, ...
 const MINOR_SHARE: f64 = 0.02;
@@ -98,8 +97,7 @@ pub(super) fn adopted(
         let coarse = Unseen::of(search, &judged.coarse, &needs)?;
         effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
     }
-    let (whole, mut unstable, mut taken) = (Whole::of(search, best, bare)?, Vec::new(), Vec::new());
-    taken.resize(effects.len(), 0.0);
+    let (whole, mut taken) = (Whole::of(search, best, bare)?, vec![0.0; effects.len()]);
     for (index, Weighed { without, standing, tied_with, .. }) in weighed.iter().enumerate() {
         let mut others = needs.clone();
         others.remove(index);
@@ -110,16 +108,12 @@ pub(super) fn adopted(
         effect.share = whole.share(own, search.candidate(&best.model().terms[index]).is_constant);
         effect.gain_heldout = gain_heldout;
         let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
-        let own =
+        let of_place =
             causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
-        effect.nearest = own.map(|(_, tried)| tried.clone()).unwrap_or_default();
-        if standing.stability.is_some_and(|stability| stability < LEAST_STABILITY) {
-            unstable.push(effects.len());
-        }
+        effect.nearest = of_place.map(|(_, tried)| tried.clone()).unwrap_or_default();
         effects.push(effect);
     }
     set_roles(&mut effects, &taken);
-    set_unstable(&mut effects, &unstable);
     let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
     Ok(Adoption { effects, unseen, pairs })
 }
@@ -195,17 +189,11 @@ fn set_roles(effects: &mut [Adopted], taken: &[f64]) {
     for k in order {
         sum += effects[k].share;
         let effect = &mut effects[k];
-        if sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT || (is_convention && effect.id == "actuation-gain") {
+        // A tied one says what else may be chosen.
+        let is_unstable = effect.stability.is_some_and(|share| share < LEAST_STABILITY) && effect.tied_with.is_empty();
+        let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT;
+        if is_small || is_unstable || (is_convention && effect.id == "actuation-gain") {
             effect.role = Part::Minor;
-        }
-    }
-}
-
-/// Causes that hang on one or two runs are minor, unless they are tied: then it is said what else may be chosen.
-fn set_unstable(effects: &mut [Adopted], unstable: &[usize]) {
-    for at in unstable {
-        if effects[*at].tied_with.is_empty() {
-            effects[*at].role = Part::Minor;
         }
     }
 }
@@ -218,7 +206,7 @@ fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted 
     Adopted {
         id: "discretisation".into(),
         kind: "numerics".into(),
-        place: Place::Discretisation.name().into(),
+        place: "numerics/discretisation".into(),
         cause: "Finitely many joints and a finite time step stand for a continuum.".into(),
         parameters: vec![Estimate {
             name: "motors_per_actuator".into(),
@@ -235,5 +223,48 @@ fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted 
         nearest: Vec::new(),
         gain_heldout,
         fixed: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cause(id: &str, share: f64, stability: Option<f64>, tied_with: &[&str]) -> Adopted {
+        Adopted {
+            id: id.into(),
+            kind: "test".into(),
+            place: "test".into(),
+            cause: String::new(),
+            parameters: Vec::new(),
+            tied_with: tied_with.iter().map(|id| (*id).to_owned()).collect(),
+            share,
+            role: Part::Cause,
+            stability,
+            curve: None,
+            nearest: Vec::new(),
+            gain_heldout: 0.0,
+            fixed: Vec::new(),
+        }
+    }
+
+    /// Roles of causes that remove 1 of χ² per value each.
+    fn roles(mut effects: Vec<Adopted>) -> Vec<Part> {
+        let taken = vec![1.0; effects.len()];
+        set_roles(&mut effects, &taken);
+        effects.iter().map(|effect| effect.role).collect()
+    }
+
+    #[test]
+    fn small_and_unstable_causes_are_minor_and_tied_ones_are_not() {
+        use Part::{Cause, Minor};
+        let shares = [0.9, 0.008, 0.011, 0.013].map(|share| cause("a", share, Some(1.0), &[]));
+        // The last two per cent: 0.8 and 1.1 % together, not 1.3 % more.
+        assert_eq!(roles(shares.to_vec()), [Cause, Minor, Minor, Cause]);
+        let stabilities = [cause("a", 0.9, Some(0.79), &[]), cause("b", 0.9, Some(0.79), &["c"]), cause("d", 0.9, None, &[])];
+        assert_eq!(roles(stabilities.to_vec()), [Minor, Cause, Cause]);
+        let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
+        set_roles(&mut within_the_noise, &[0.2]);
+        assert_eq!(within_the_noise[0].role, Minor);
     }
 }

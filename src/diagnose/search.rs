@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, inner, sum_of_squares};
+use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::split::Split;
@@ -20,15 +20,15 @@ pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
 /// right; ...
 const LEAST_SHARE: f64 = 0.004;
-/// Nothing more is sought once no more than this share of it is left and less than [`VISIBLE`]: further causes would be minor, and would parcel out what
-/// the laws of the others do not follow.
-pub(super) const SOUGHT: f64 = 0.02;
-/// Misfit (χ² per value above 1) of half the noise.
-pub(super) const VISIBLE: f64 = 0.25;
 /// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
 const LEAST_BIC: f64 = 10.0;
+/// Nothing more is sought once no more than this share of what re-tuned constants leave is left, and less than [`VISIBLE`]: further causes would be
+/// minor, and would parcel out what the laws of the others do not follow.
+pub(super) const SOUGHT: f64 = 0.02;
+/// Misfit (χ² per value above 1) of half the noise.
+pub(super) const VISIBLE: f64 = 0.25;
 /// A cause that no select run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
 const SEEN_BY_FIT: f64 = 0.1;
 /// A cause whose linear estimate exceeds that by this factor is not left out on trial.
@@ -257,27 +257,16 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if `model` cannot be simulated.
     pub(super) fn start_beyond(&self, model: &Model, screened: &Screened) -> Result<Model, DiagnoseError> {
-        let (runs, known) = (&self.split.fit, self.known(screened));
-        let before: Vec<&Residuals> = runs.iter().map(|run| &screened.residuals[*run]).collect();
+        let runs = &self.split.fit;
+        let before: Vec<Residuals> = runs.iter().map(|run| screened.residuals[*run].clone()).collect();
         let chi2 = |residuals: &[Residuals]| residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>();
         let moved = self.estimator.residuals_of(model, runs)?;
-        let change: Vec<Residuals> =
-            moved.iter().zip(&before).map(|(a, b)| a.iter().zip(*b).map(|(a, b)| a - b).collect()).collect();
-        let columns: Vec<&Vec<Residuals>> = std::iter::once(&change).chain(&known).collect();
-        let n = columns.len();
-        let mut information =
-            DMatrix::from_fn(
-                n,
-                n,
-                |i, j| {
-                    if i <= j { columns[i].iter().zip(columns[j]).map(|(a, b)| inner(a, b)).sum() } else { 0.0 }
-                },
-            );
-        information.fill_lower_triangle_with_upper_triangle();
-        (0..n).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
-        let right = DVector::from_fn(n, |k, _| -columns[k].iter().zip(&before).map(|(a, b)| inner(a, b)).sum::<f64>());
+        let change = moved.iter().zip(&before).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+        let columns: Derivatives = std::iter::once(change).chain(self.known(screened)).collect();
+        let (gradient, mut information) = normal_equations(&before, &columns);
+        (0..columns.len()).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
         let mut best = (chi2(&moved), model.clone());
-        let Some(by) = information.lu().solve(&right).filter(|by| by[0] > 0.0 && by.iter().all(|by| by.is_finite())) else {
+        let Some(by) = information.lu().solve(&-gradient).filter(|by| by[0] > 0.0 && by.iter().all(|by| by.is_finite())) else {
             return Ok(best.1);
         };
         for share in [1.0, 0.5, 0.25] {

@@ -29,10 +29,10 @@ impl Ties {
     pub(super) fn new(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_total: f64) -> Self {
         let compared = |(removed, trial): &(usize, Trial)| {
             let index = best.model().terms.iter().position(|term| term.candidate == *removed)?;
-            let [_, others @ ..] = &trial.scored.model().terms[..] else { return None };
-            let is_of_best = |term: &Term| best.model().terms.iter().any(|own| own.candidate == term.candidate);
-            let has_others = others.len() + 1 == best.model().terms.len()
-                && trial.scored.model().terms.iter().filter(|term| term.candidate != trial.candidate).all(is_of_best);
+            let (terms, of_best) = (&trial.scored.model().terms, &best.model().terms);
+            let is_of_best = |term: &Term| of_best.iter().any(|own| own.candidate == term.candidate);
+            let has_others =
+                terms.len() == of_best.len() && terms.iter().filter(|term| term.candidate != trial.candidate).all(is_of_best);
             if !has_others || search.id(*removed) == search.id(trial.candidate) {
                 return None;
             }
