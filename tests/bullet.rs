@@ -71,6 +71,8 @@ fn wrong_lengths_steps_and_foreign_bodies_are_errors() {
     assert_eq!(world.base_state(foreign), Err(BulletError::ForeignBody));
     assert!(world.add_fixed_constraint(body, 0.0).is_err());
     assert!(world.add_sprung_constraint(body, [0.0; 3], 0.0, 0.0, 0.0, 500.0).is_err());
+    assert!(world.set_constraint_shift(body, 0.0, 0.0).is_err());
+    assert!(world.set_constraint_shift(body, 1e-7, -1.0).is_err());
     assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, -1.0, 0.0, 500.0).is_err());
     assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, 0.0, -1.0, 500.0).is_err());
     assert!(world.add_sprung_constraint(body, [f64::NAN; 3], 1e-7, 0.0, 0.0, 500.0).is_err());

@@ -71,6 +71,8 @@ fn near_its_off_value_an_effect_changes_little_and_further_off_more() {
                         Some(off) => {
                             off + share * if p.bounds[1] > off { (p.bounds[1] - off).min(5.0) } else { p.bounds[0] - off }
                         }
+                        // In the run at the mean of all nothing has drifted.
+                        None if p.name == "run" => 1.0,
                         None => p.default.filter(|value| value.is_finite()).unwrap_or(1.0),
                     };
                     (p.name, value)
@@ -105,6 +107,36 @@ fn limits_of_the_driver_act_beyond_them_only() {
 }
 
 #[test]
+fn a_drift_is_a_factor_of_its_run_and_none_in_the_mean_run() {
+    for (drift, constant) in [("gain-drift", "actuation-gain"), ("stiffness-drift", "stiffness")] {
+        let of = |run_: f64| run(&with(CANTILEVER, drift, &[("per_run", 0.05), ("run", run_)]), &[]).recording;
+        for (place, scale) in [(2.0, 1.1), (-2.0, 0.9)] {
+            assert_eq!(of(place), run(&with(CANTILEVER, constant, &[("scale", scale)]), &[]).recording, "{drift} {place}");
+        }
+        assert_eq!(of(0.0), run(CANTILEVER, &[]).recording, "{drift}");
+    }
+}
+
+#[test]
+fn a_remanent_offset_holds_the_tip_where_the_same_voltage_would() {
+    // At 0 V after −1500 V: a tenth of what lies beyond 500 V has stayed.
+    let sequence = |volts: &str, end: f64| {
+        CANTILEVER.replace(
+            "waveform = \"sine\"\namplitude_v = -1000\nfrequency_hz = 5",
+            &format!("waveform = \"sequence\"\nphases = [{{ until_s = 0.1, voltages_v = [0] }}, {{ until_s = 0.3, voltages_v = [{volts}] }}, {{ voltages_v = [{end:?}] }}]"),
+        )
+    };
+    let settings = ["simulation.duration_s=1.0", "robot.damping_eta=0.05"];
+    let remanence = [("share", 0.1), ("coercive_v", 500.0)];
+    let held = tip(&run(&with(&sequence("-1500", 0.0), "remanence", &remanence), &settings));
+    let driven = tip(&run(&sequence("-1500", -100.0), &settings));
+    let rest = tip(&run(&sequence("0", 0.0), &settings));
+    // The larger drive before rings a little more: by 1/15 of what is left of it.
+    assert!((held - driven).abs() < 1e-3 * (driven - rest).abs(), "{held} {driven} {rest}");
+    assert!((driven - rest).abs() > 0.1, "{driven} {rest}");
+}
+
+#[test]
 fn a_clamp_that_gives_adds_its_turn_to_the_sag() {
     let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01"];
     let [stiff, soft] =
@@ -118,6 +150,82 @@ fn a_clamp_that_gives_adds_its_turn_to_the_sag() {
     let values = [("compliance_rad_per_n_m", 0.5), ("hardening_per_rad", hardening)];
     let hard = tip(&run(&with(CANTILEVER, "clamp-compliance", &values), &rest));
     assert!(((hard - stiff) / (0.5 * expected) - 1.0).abs() < 1e-3, "{stiff} {hard} {expected}");
+}
+
+#[test]
+fn a_clamp_that_shifts_lets_the_whole_sheet_down_by_its_weight() {
+    let rest = ["drive.amplitude_v=0", "simulation.duration_s=0.01"];
+    let [stiff, soft] = [0.0, 20.0].map(|c| run(&with(CANTILEVER, "clamp-shift", &[("compliance_mm_per_n", c)]), &rest));
+    // 20 mm/N is 2e-5 cm/dyn.
+    let expected = -2e-5 * 4.804359999999999 * 980.0;
+    let root = |run: &Run| run.recording.node(run.recording.len() - 1, 0)[2];
+    // The shape is the same: rounding of the statics only.
+    assert!((root(&soft) / expected - 1.0).abs() < 1e-9 && root(&stiff) == 0.0, "{} {expected}", root(&soft));
+    assert!(((tip(&soft) - tip(&stiff)) / expected - 1.0).abs() < 1e-9, "{} {}", tip(&soft), tip(&stiff));
+    // With a clamp that turns, too, each gives as alone.
+    let both = with(
+        &with(CANTILEVER, "clamp-shift", &[("compliance_mm_per_n", 20.0)]),
+        "clamp-compliance",
+        &[("compliance_rad_per_n_m", 0.5)],
+    );
+    let turning = run(&with(CANTILEVER, "clamp-compliance", &[("compliance_rad_per_n_m", 0.5)]), &rest);
+    assert!(((tip(&run(&both, &rest)) - tip(&turning)) / expected - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_taut_cable_holds_the_tip_as_a_spring_at_the_end_of_a_beam() {
+    // Without gravity, under a voltage whose free deflection is w: w/(1 + k L³/3B) beyond the level.
+    let settings = ["simulation.duration_s=0.01", "material.gravity_m_s2=0", "robot.motors_per_actuator=20", "drive.waveform=dc"];
+    let text = |volts: f64| CANTILEVER.replace("amplitude_v = -1000\nfrequency_hz = 5", &format!("voltages_v = [{volts:?}]"));
+    let free = |volts: f64| tip(&run(&text(volts), &settings));
+    let held = |volts: f64, values: &[(&str, f64)]| tip(&run(&with(&text(volts), "cable-drag", values), &settings));
+    let rigidity = robot().joint().stiffness * robot().link_length();
+    // 10 N/m is 10⁴ dyn/cm.
+    let share = 1.0 / (1.0 + 1e4 * 1e3 / (3.0 * rigidity));
+    for (volts, level, below) in [(50.0, 0.04, 0.0), (-50.0, -0.04, 1.0)] {
+        let values = [("stiffness_n_per_m", 10.0), ("level_mm", 10.0 * level), ("below", below)];
+        let (plain, found) = (free(volts), held(volts, &values));
+        assert!(plain.abs() > 0.09, "{plain}");
+        // The chain's error at m = 20 is 1/(2m²) of the compliance, and the sheet turns by 0.02 rad.
+        assert!(((found - level) / (share * (plain - level)) - 1.0).abs() < 3e-3, "{found} {plain} {share}");
+        // On the other side it is slack.
+        assert_eq!(held(-volts, &values), free(-volts), "{volts}");
+    }
+}
+
+#[test]
+fn a_cables_friction_takes_the_same_from_every_stroke_and_its_damper_the_same_share() {
+    // One joint, let go from flat, in gravity, without loss of its own; the cable is always taut.
+    let ring = "[robot]\nactuators = 1\nmotors_per_actuator = 1\nmount = \"clamped\"\ndamping_eta = 0.0\n[drive]\nwaveform = \"dc\"\n\
+        voltages_v = [0]\n[simulation]\nengine = \"planar\"\nnumerical_damping_per_s = 0\ntime_step_s = 1e-4\nduration_s = 0.3\n\
+        record_every_s = 1e-4\n";
+    let strokes = |values: &[(&str, f64)]| {
+        let always = [("stiffness_n_per_m", 1.0), ("level_mm", 50.0)];
+        let values: Vec<_> = always.into_iter().chain(values.iter().copied()).collect();
+        let r = run(&with(ring, "cable-drag", &values), &[]).recording;
+        let z: Vec<f64> = (0..r.len()).map(|k| r.node(k, r.nodes() - 1)[2]).collect();
+        let turns: Vec<f64> = z.windows(3).filter(|w| (w[1] - w[0]) * (w[2] - w[1]) < 0.0).map(|w| w[1]).collect();
+        turns.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<f64>>()
+    };
+    // A box of 5 cm at the joint, the cable at its end: 1 N/m is 1000 dyn/cm.
+    let robot = experiment::experiment(&Source::from_text("test", ring)).unwrap().robot;
+    let (stiffness, inertia) = (robot.joint().stiffness + 1000.0 * 25.0, 0.5 * 4.804359999999999 * (25.0 + 0.01 / 4.0) / 3.0);
+    let free = strokes(&[]);
+    assert!((free[8] / free[0] - 1.0).abs() < 1e-3, "{free:?}");
+    // 0.2 mN is 20 dyn: the strokes fall by 4 f/k, with k at the tip.
+    let rubbed = strokes(&[("drag_mn", 0.2)]);
+    for fall in rubbed[..8].windows(2).map(|w| w[0] - w[1]) {
+        let expected = 4.0 * 20.0 / (stiffness / 25.0);
+        // Near its turning points the friction is viscous: a few per cent less. Records are 0.9° of a cycle apart.
+        assert!((fall / expected - 1.0).abs() < 0.08, "{fall} {expected}");
+    }
+    // Damping ratio c/(2 √(k I)) with c = k_c T·25 cm².
+    let ratio = 1000.0 * 0.02 * 25.0 / (2.0 * (stiffness * inertia).sqrt());
+    let damped = strokes(&[("damping_s", 0.02)]);
+    for kept in damped[..8].windows(2).map(|w| w[1] / w[0]) {
+        let expected = (-PI * ratio / (1.0 - ratio * ratio).sqrt()).exp();
+        assert!((kept / expected - 1.0).abs() < 0.01, "{kept} {expected}");
+    }
 }
 
 #[test]
@@ -277,6 +385,8 @@ fn what_cannot_be_applied_is_refused_by_name() {
         ("free-clamp", vec![("range_mn_m", 0.0), ("compliance_2_rad_per_n_m", 0.1)], "between"),
         ("weak-actuator", vec![("actuator", 2.0), ("gain", 0.5)], "1 actuators"),
         ("stiffness", vec![("scale", f64::NAN)], "between"),
+        ("gain-drift", vec![("per_run", 0.1), ("run", -9.5)], "at least 0.1"),
+        ("stiffness-drift", vec![("per_run", -0.1), ("run", 1e5)], "at least 0.1"),
     ] {
         let error = experiment::experiment(&Source::from_text("x.toml", with(CANTILEVER, id, &values))).unwrap_err().to_string();
         assert!(error.contains(word) && error.contains("x.toml"), "{id}: {error}");
@@ -296,6 +406,10 @@ fn both_engines_bend_alike() {
         ("structural-damping", vec![("loss_factor", 0.05)]),
         ("passive-margin", vec![("fraction", 0.2)]),
         ("stiffness", vec![("scale", 1.2)]),
+        ("stiffness-drift", vec![("per_run", 0.05), ("run", -3.0)]),
+        ("gain-drift", vec![("per_run", 0.05), ("run", 3.0)]),
+        ("remanence", vec![("share", 0.2), ("saturation_v", 60.0)]),
+        ("wake-up", vec![("change", -0.2), ("path_kv", 1.0)]),
     ] {
         let text = with(CANTILEVER, id, &values);
         let on = |engine: &str, step: &str| {
@@ -313,6 +427,9 @@ fn both_engines_bend_alike() {
 fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     let text = with(&with(CANTILEVER, "hysteresis", &[("width", 0.2)]), "creep", &[("per_decade", 0.02)]);
     let text = with(&with(&text, "driver-lag", &[("time_constant_s", 0.01)]), "structural-damping", &[("loss_factor", 0.02)]);
+    let cable = [("stiffness_n_per_m", 3.0), ("level_mm", 2.0), ("drag_mn", 1.0), ("damping_s", 0.01)];
+    let text = with(&text, "cable-drag", &cable);
+    let text = with(&with(&text, "remanence", &[("share", 0.1), ("coercive_v", 300.0)]), "wake-up", &[("change", -0.1)]);
     let experiment =
         experiment::experiment(&Source::from_text("test", with(&text, "dry-friction", &[("moment_mn_m", 0.1)]))).unwrap();
     let mut whole = experiment.engine().unwrap();

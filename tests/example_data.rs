@@ -72,7 +72,7 @@ fn a_voltage_of_its_own_file_is_brought_to_the_clock_of_the_camera() {
     let d = diagnosed("two_clocks");
     assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("named"), vec!["tip-mass"]), "{}", d["summary"]);
     // The offsets of examples/measured_data.py.
-    let clock = d["bench"].as_array().unwrap().iter().find(|fault| fault["id"] == "clock offset").unwrap();
+    let clock = d["bench"]["faults"].as_array().unwrap().iter().find(|fault| fault["id"] == "clock offset").unwrap();
     let found: Vec<f64> = clock["runs"].as_array().unwrap().iter().map(|run| run["value"].as_f64().unwrap()).collect();
     assert!(found.iter().zip([-4.6, 4.1, -2.8, 3.5]).all(|(found, ms)| (found - ms).abs() < 0.2), "{found:?}");
     let remarks: Vec<&str> = d["data_quality"].as_array().unwrap().iter().filter_map(Value::as_str).collect();

@@ -12,17 +12,19 @@ use sfers::diagnose::extended;
 use sfers::diagnose::plant::{Model, Nuisance, Plant, Term};
 use sfers::diagnose::quality;
 use sfers::diagnose::robot::RobotPlant;
+use sfers::effects::View;
 use sfers::experiment::{self, Control, Source};
 
 /// Agreement (mm): rounding of results that are computed alike.
 const SAME: f64 = 1e-9;
 
-/// A short run of two actuators with jumps and slopes of both signs, on rows that fall on steps.
-fn write(folder: &Path, mount: &str, m: usize) {
-    let toml = format!(
+/// Short runs of two actuators with jumps and slopes of both signs, all alike, on rows that fall on steps.
+fn write(folder: &Path, mount: &str, m: usize, runs: usize) {
+    let mut toml = format!(
         "[dataset]\nname = \"x\"\n[robot]\nactuators = 2\nmotors_per_actuator = {m}\nmount = \"{mount}\"\ndamping_eta = 0.01\npositive_gain = 1.2\n\
-         [markers]\nmid = 100.0\ntip = 200.0\n[noise]\ndefault_mm = 0.05\n[[run]]\nid = \"a\"\nfile = \"a.csv\"\n"
+         [markers]\nmid = 100.0\ntip = 200.0\n[noise]\ndefault_mm = 0.05\n"
     );
+    (1..=runs).for_each(|run| write!(toml, "[[run]]\nid = \"{run}\"\nfile = \"a.csv\"\n").unwrap());
     fs::write(folder.join("x.toml"), toml).unwrap();
     let mut rows = String::from("t_s,v1_v,v2_v,mid_x_mm,mid_z_mm,tip_x_mm,tip_z_mm\n");
     for i in 0..60 {
@@ -37,6 +39,16 @@ fn write(folder: &Path, mount: &str, m: usize) {
 /// Every jump after 0.4 of its interval.
 fn nuisance(plant: &RobotPlant) -> Nuisance {
     Nuisance { shares: vec![0.4; plant.nuisances(0)], ..Nuisance::default() }
+}
+
+/// The place (cm) that `view` shows at `seen` (cm), for views that change places little.
+fn place_of(view: &View, seen: [f64; 2]) -> [f64; 2] {
+    let mut place = seen;
+    for _ in 0..50 {
+        let shown = view.of(place);
+        place = [0, 1].map(|axis| place[axis] + seen[axis] - shown[axis]);
+    }
+    place
 }
 
 /// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.
@@ -60,7 +72,7 @@ fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) ->
         along += segment.length;
     }
     places.push(along);
-    let bent = toml.contains("free-picture");
+    let view = View::new(&experiment.effects);
     let mut worst = 0.0_f64;
     for (i, signal) in predicted.iter().enumerate() {
         let (t, channel) = (plant.signals()[0].times[i], plant.signals()[0].channels[i]);
@@ -68,15 +80,13 @@ fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) ->
         let position = plant.markers()[channel / 2];
         let body = (0..nodes - 1).rev().find(|body| places[*body] < position).unwrap_or(0);
         let share = (position - places[body]) / (places[body + 1] - places[body]);
-        // A picture that is bent does not keep straight what lies between two nodes.
-        if bent && share < 1.0 - 1e-9 {
-            continue;
-        }
-        let axis = 2 * (channel % 2);
-        let between = |of: &dyn Fn(usize) -> f64| of(body) + share * (of(body + 1) - of(body));
-        let shift = if axis == 0 { 0.5 * segments[0].length } else { 0.0 };
-        let view = between(&|node| recording.node(record, node)[axis]) + shift;
-        worst = worst.max((10.0 * view - signal).abs());
+        // Links are straight, but not in a picture that is bent: a marker lies between the true places of two nodes, from the left end.
+        let [left, right] = [body, body + 1].map(|node| {
+            let [x, _, z] = recording.node(record, node);
+            place_of(&view, [x + 0.5 * segments[0].length, z])
+        });
+        let seen = view.of([0, 1].map(|axis| left[axis] + share * (right[axis] - left[axis])));
+        worst = worst.max((10.0 * seen[channel % 2] - signal).abs());
     }
     Ok(worst)
 }
@@ -85,7 +95,7 @@ fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) ->
 fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
     for (mount, m) in [("clamped", 3), ("ground", 2)] {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), mount, m);
+        write(folder.path(), mount, m, 3);
         let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
         let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
         let nominal = Model::new(Vec::new(), m as f64, true);
@@ -121,9 +131,32 @@ fn every_cause_that_a_fit_can_adopt_survives_the_way_through_the_file() {
 }
 
 #[test]
+fn a_drift_is_another_constant_in_each_run_in_the_order_of_the_data_set() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "clamped", 2, 4);
+    let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
+    let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+    let candidate = |id: &str| plant.candidates().iter().position(|c| c.id == id).unwrap();
+    for (drift, constant) in [("gain-drift", "actuation-gain"), ("stiffness-drift", "stiffness")] {
+        let of = |id: &str, x: f64, run: usize| {
+            let model = Model::new(vec![Term { candidate: candidate(id), x: vec![x] }], 2.0, true);
+            plant.predict(&model, run, &nuisance(&plant)).unwrap()
+        };
+        for (run, from_mean) in [-1.5, -0.5, 0.5, 1.5].into_iter().enumerate() {
+            assert_eq!(of(drift, 0.0625, run), of(constant, 1.0 + 0.0625 * from_mean, run), "{drift} {run}");
+        }
+    }
+    // Two runs differ by a drift whatever makes them differ.
+    write(folder.path(), "clamped", 2, 2);
+    let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
+    let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+    assert!(plant.candidates().iter().all(|c| !c.id.ends_with("-drift")));
+}
+
+#[test]
 fn a_free_form_is_written_with_lists() {
     let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), "clamped", 3);
+    write(folder.path(), "clamped", 3, 1);
     let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
     let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
     for (id, key, weights) in [
@@ -144,7 +177,7 @@ fn a_free_form_is_written_with_lists() {
 /// Diagnoses the single run of [`write`] and compares the file's recording with the column of residuals.csv.
 fn as_a_user_does(mount: &str) -> f64 {
     let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), mount, 2);
+    write(folder.path(), mount, 2, 1);
     let done = |args: &[&str]| {
         let output = sfers(folder.path(), args);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -71,6 +71,10 @@ fn a_cause_outside_the_library_is_called_unexplained_and_described() {
     for (index, id) in chosen.iter().enumerate() {
         let (_, outcome) = found(&case(&[id], 1 + index % 2, 21 + index as u64));
         let d = &outcome.diagnosis;
+        // Some have a namesake in the library, with another equation.
+        if is_right(d, id) {
+            continue;
+        }
         if d.verdict == Verdict::Unexplained {
             assert!(!d.unexplained.is_empty(), "{id}");
         } else {
@@ -116,15 +120,14 @@ fn faults_of_the_bench_are_found_as_such_and_are_no_causes() {
     };
     let d = on_a_bench(&[], 2);
     assert_eq!((d.verdict, names(&d)), (Verdict::None, vec![]), "{}", d.summary);
-    let spread = |id: &str| d.bench.iter().find(|fault| fault.id == id).map_or(0.0, |fault| fault.spread);
     // Of eleven runs, a factor of two in all but some 0.5 % of cases.
-    for (id, truth) in [("clock offset", 4.0), ("zero", 0.2), ("gain", 0.01)] {
-        assert!((0.5..2.0).contains(&(spread(id) / truth)), "{id}: {}", spread(id));
+    for (found, truth) in [(d.bench.clock_ms, 4.0), (d.bench.zero_mm, 0.2), (d.bench.gain, 0.01)] {
+        assert!((0.5..2.0).contains(&(found / truth)), "{:?}", d.bench);
     }
     assert!((0.3..0.7).contains(&d.noise_correlated), "{}", d.noise_correlated);
     assert!((0.045..0.055).contains(&d.noise_mm), "{} mm", d.noise_mm);
     let gains = found(&case(&[generator::DRIFTING_GAIN], 1, 21)).1.diagnosis;
-    assert_eq!((gains.verdict, gains.bench[0].id), (Verdict::None, "gain"), "{}", gains.summary);
+    assert_eq!((gains.verdict, gains.bench.faults[0].id), (Verdict::None, "gain"), "{}", gains.summary);
     let d = on_a_bench(&["creep"], 9);
     assert!(is_right(&d, "creep"), "{:?} {:?}", d.verdict, names(&d));
 }

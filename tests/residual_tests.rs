@@ -9,7 +9,6 @@ use common::random::Random;
 use sfers::diagnose::DiagnoseError;
 use sfers::diagnose::plant::{Candidate, Model, Nuisance, Plant, Signal};
 use sfers::diagnose::residual_tests::residual_tests;
-use sfers::diagnose::search::Split;
 
 /// Plants, runs of each, and alarms of a test on every run that a rate of 1/1000 gives in all: 20 ± 4.5, so that 4 to 40 lie within four and a half
 /// standard deviations (binomial).
@@ -91,8 +90,7 @@ fn alarms(case: &Case, seed: u64) -> BTreeMap<String, usize> {
             residuals.push(left);
         }
         let plant = Measured { signals };
-        let split = Split { fit: (0..RUNS).collect(), held: Vec::new() };
-        for test in residual_tests(&plant, &split, &used, &residuals) {
+        for test in residual_tests(&plant, &used, &residuals) {
             *found.entry(test.name).or_default() += usize::from(!test.passed);
         }
     }

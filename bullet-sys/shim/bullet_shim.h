@@ -122,6 +122,10 @@ int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pi
 int32_t bs_bent_constraint_add(bs_world *world, int32_t body, const double *pivot, double width, const double *compliances, double damping_time,
                                double max_impulse, char *error, int32_t error_length);
 
+/* Lets what ties a body also give in z, by `compliance` (cm/dyn) times the force on it, with a damper of `damping_time` (s) times the
+ * spring's stiffness; implicit, too. The body must be tied. */
+int32_t bs_constraint_shift_set(bs_world *world, int32_t body, double compliance, double damping_time, char *error, int32_t error_length);
+
 /* Reads all joints at once. angles (rad), rates (rad/s): `length` values each, one per link. */
 int32_t bs_joint_states(const bs_world *world, int32_t body, double *angles, double *rates, int32_t length);
 

@@ -8,7 +8,7 @@ namespace bs {
 
 static constexpr int ROWS = 6;
 static constexpr int BASE = -1;
-static constexpr int TURN_ABOUT_Y = 4;  // of the rows
+static constexpr int SHIFT_IN_Z = 2, TURN_ABOUT_Y = 4;  // of the rows
 
 FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world)
     : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), btVector3(0, 0, 0), world.getOrigin(),
@@ -49,7 +49,7 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
                                            const btContactSolverInfo &info) {
   btMultiBody *body = m_bodyA;
   // A compliance is none of Bullet's.
-  if ((AS_SHIPPED && compliance_ == 0 && !is_bent()) || !chain_.read(*body)) {
+  if ((AS_SHIPPED && is_rigid()) || !chain_.read(*body)) {
     return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
   }
 
@@ -106,24 +106,25 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
     const btScalar position = -error * info.m_erp / info.m_timeStep, velocity = -row.velocity;
     out.m_rhs = position * out.m_jacDiagABInv + velocity * out.m_jacDiagABInv;
     out.m_cfm = 0;
-    if (compliance_ > 0 && i == TURN_ABOUT_Y) {
-      // Of the moment and of its slope over the linear ones, at the present turn.
-      const btScalar moment = 1 + hardening_ * hardening_ * error * error, slope = 3 * moment - 2;
-      const btScalar whole = slope * info.m_timeStep + damping_time_;
-      const btScalar softness = compliance_ / (info.m_timeStep * whole);
-      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
-      out.m_cfm = softness * out.m_jacDiagABInv;
-      out.m_rhs = (velocity - error * moment / whole) * out.m_jacDiagABInv;
-    }
-    if (is_bent() && i == TURN_ABOUT_Y) {
-      // phi + (h + T) omega = C(M), about the moment M* of the present turn and rate: C(M*) + c (M - M*). The impulse is -h M.
-      const btScalar rate = body->getBaseOmega().dot(row.angular), whole = info.m_timeStep + damping_time_;
-      btScalar moment, compliance;
-      moment_of(error + damping_time_ * rate, &moment, &compliance);
+    // Makes the row a spring of `compliance` c with a damper at the step's end: its impulse is -h (pull + whole omega) / c, omega the rate then.
+    const auto soften = [&](btScalar compliance, btScalar whole, btScalar pull) {
       const btScalar softness = compliance / (info.m_timeStep * whole);
       out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
       out.m_cfm = softness * out.m_jacDiagABInv;
-      out.m_rhs = (velocity - (compliance * moment - damping_time_ * rate) / whole) * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - pull / whole) * out.m_jacDiagABInv;
+    };
+    if (i == TURN_ABOUT_Y && is_bent()) {
+      // phi + (h + T) omega = C(M), about the moment M* of the present turn and rate: C(M*) + c (M - M*). The impulse is -h M.
+      const btScalar rate = spin_.dot(row.angular);
+      btScalar moment, compliance;
+      moment_of(error + damping_time_ * rate, &moment, &compliance);
+      soften(compliance, info.m_timeStep + damping_time_, compliance * moment - damping_time_ * rate);
+    } else if (i == TURN_ABOUT_Y && compliance_ > 0) {
+      // Of the moment and of its slope over the linear ones, at the present turn.
+      const btScalar moment = 1 + hardening_ * hardening_ * error * error, slope = 3 * moment - 2;
+      soften(compliance_, slope * info.m_timeStep + damping_time_, error * moment);
+    } else if (i == SHIFT_IN_Z && shift_compliance_ > 0) {
+      soften(shift_compliance_, info.m_timeStep + shift_damping_time_, error);
     }
     out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;

@@ -166,6 +166,7 @@ inline double fingerprint(const bs_world &world) {
       mix(constraint->width());
       for (int i = 0; i < BS_CLAMP_POINTS; ++i) mix(constraint->bent_compliance(i));
     }
+    if (constraint->shift_compliance() != 0) mix(constraint->shift_compliance()), mix(constraint->shift_damping_time());
   }
   return static_cast<double>(hash >> 12);
 }

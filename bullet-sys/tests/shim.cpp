@@ -251,6 +251,10 @@ void misuse() {
   CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, NOT_A_NUMBER, 0, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, 0, -1, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_sprung_constraint_add(w, 3, at, 1e-6, 0, NOT_A_NUMBER, 1, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_constraint_shift_set(nullptr, 1, 1e-6, 0, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_constraint_shift_set(w, 1, 0, 0, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_constraint_shift_set(w, 1, 1e-6, NOT_A_NUMBER, nullptr, 0) == BS_ERROR_ARGUMENT);
+  CHECK(bs_constraint_shift_set(w, 1, 1e-6, 0, nullptr, 0) == BS_ERROR_ARGUMENT);  // a body that nothing ties
   CHECK(sprung(w, world.crate, at, 1e-6, 1) == BS_ERROR_ARGUMENT);  // a body without links
   const double soft[BS_CLAMP_POINTS] = {1e-6, 1e-6, 1e-6, 1e-6}, rigid[BS_CLAMP_POINTS] = {1e-6, 0, 1e-6, 1e-6};
   auto bent = [&](const double *pivot, double width, const double *compliances, double damping, double impulse) {
@@ -451,6 +455,11 @@ void beyond_plain_boxes() {
   CHECK(bs_multibody_add(bent.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
   CHECK(bs_bent_constraint_add(bent.handle, body, pivot, 1e4, compliances, 0, 1e6, nullptr, 0) == BS_OK);
   CHECK(restore(bent, hung) == BS_ERROR_SNAPSHOT);
+  World shifting(settings());
+  CHECK(bs_multibody_add(shifting.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
+  CHECK(bs_sprung_constraint_add(shifting.handle, body, pivot, 1e-7, 0, 0, 1e6, nullptr, 0) == BS_OK);
+  CHECK(bs_constraint_shift_set(shifting.handle, body, 1e-7, 0, nullptr, 0) == BS_OK);
+  CHECK(restore(shifting, hung) == BS_ERROR_SNAPSHOT);
 }
 
 // A driven world in mid-jump, with some contacts left.

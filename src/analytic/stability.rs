@@ -5,7 +5,7 @@
 
 use nalgebra::SMatrix;
 
-use crate::model::{DRY_FRICTION_RATE, LOSS_TIMES, Mount, Robot};
+use crate::model::{ATTACHMENT_RATE, Attachment, DRY_FRICTION_RATE, LOSS_TIMES, Mount, Robot};
 
 /// Relative width at which a bisection ends.
 const PRECISION: f64 = 1e-15;
@@ -32,6 +32,18 @@ struct Chain {
     mount: Mount,
     /// Stiffness of a compliant clamp (dyn·cm/rad).
     clamp: Option<f64>,
+    /// Stiffness of a clamp that shifts (dyn/cm).
+    slide: Option<f64>,
+    /// What is fixed to the sheet.
+    points: Vec<Point>,
+}
+
+/// A tape or cable: its body, the lever from the body's left end (cm), and its steepest stiffness and damping (dyn/cm, dyn·s/cm).
+struct Point {
+    body: usize,
+    lever: f64,
+    stiffness: f64,
+    damping: f64,
 }
 
 impl Chain {
@@ -44,29 +56,51 @@ impl Chain {
             let arm = body.middle * length;
             Inertia { mass: body.mass, moment: body.mass * arm, about_end: body.inertia + body.mass * arm * arm }
         };
+        let point = |law: &Attachment| {
+            let (body, share) = robot.body_at(law.position);
+            let damping = law.stiffness * law.damping + law.friction / ATTACHMENT_RATE;
+            Point { body, lever: share * lengths[body], stiffness: law.stiffness, damping }
+        };
         Self {
+            points: robot.extensions.attachments.iter().map(point).collect(),
             bodies: bodies.iter().zip(&lengths).map(inertia).collect(),
             lengths,
             mount: robot.mount,
+            slide: (robot.mount == Mount::Clamped && robot.extensions.clamp_shift > 0.0)
+                .then(|| 1.0 / robot.extensions.clamp_shift),
             clamp: (robot.mount == Mount::Clamped && compliance > 0.0).then(|| 1.0 / compliance),
         }
     }
 
-    /// True if `scale`·M − `drag`·A + `joint`·1 + `clamp`·E is positive definite, with A the unit matrix of the bodies' angles, 1 that of the joints
-    /// and E that of the clamp: all pivots of the articulated-body recursion, tip to base, are positive.
-    fn is_positive(&self, scale: f64, drag: f64, joint: f64, clamp: f64) -> bool {
+    /// True if `scale`·M − `drag`·A + `joint`·1 + `clamp`·E − 2 h C − h² K is positive definite, with A the unit matrix of the bodies' angles, 1 that of
+    /// the joints, E that of the clamp, h the `step` (s), and C and K of what is fixed to the sheet: all pivots of the articulated-body recursion, tip to base,
+    /// are positive.
+    fn is_positive(&self, scale: f64, drag: f64, joint: f64, clamp: f64, step: f64) -> bool {
         let mut outboard = Inertia::default();
         for (i, (body, length)) in self.bodies.iter().zip(&self.lengths).enumerate().rev() {
             // Articulated inertia of the outboard bodies and this one, about its left end.
             let Inertia { mass, moment, about_end } = outboard;
-            let articulated = Inertia {
+            let mut articulated = Inertia {
                 mass: scale * body.mass + mass,
                 moment: scale * body.moment + moment + mass * length,
                 about_end: scale * body.about_end - drag + about_end + length * (2.0 * moment + mass * length),
             };
+            for point in self.points.iter().filter(|point| point.body == i) {
+                let taken = step * (2.0 * point.damping + step * point.stiffness);
+                articulated.mass -= taken;
+                articulated.moment -= taken * point.lever;
+                articulated.about_end -= taken * point.lever * point.lever;
+            }
             if i == 0 {
                 return match self.mount {
-                    Mount::Clamped => self.clamp.is_none() || articulated.about_end + clamp > 0.0,
+                    Mount::Clamped => {
+                        let turning = articulated.about_end + clamp;
+                        let sinking = articulated.mass + step * step * self.slide.unwrap_or(0.0);
+                        let coupling = if self.clamp.is_some() { articulated.moment } else { 0.0 };
+                        (self.clamp.is_none() || turning > 0.0)
+                            && (self.slide.is_none()
+                                || (sinking > 0.0 && (self.clamp.is_none() || sinking * turning > coupling * coupling)))
+                    }
                     _ => {
                         articulated.mass > 0.0
                             && articulated.mass * articulated.about_end - articulated.moment * articulated.moment > 0.0
@@ -118,7 +152,7 @@ fn largest(high: f64, holds: impl Fn(f64) -> bool) -> f64 {
 pub fn highest_joint_frequency(robot: &Robot) -> f64 {
     let chain = Chain::new(robot);
     // K is a multiple of the unit matrix: the largest ω² is k over the smallest eigenvalue of M.
-    let smallest = largest(chain.last(), |eigenvalue| chain.is_positive(1.0, 0.0, -eigenvalue, 0.0));
+    let smallest = largest(chain.last(), |eigenvalue| chain.is_positive(1.0, 0.0, -eigenvalue, 0.0, 0.0));
     (robot.joint().stiffness * stiffest(robot) / smallest).sqrt()
 }
 
@@ -139,8 +173,8 @@ fn stiffest(robot: &Robot) -> f64 {
 /// At the limit a mode alternates from step to step with constant amplitude. For one mode of frequency ω with c = ηω² the limit is
 /// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require a smaller step.
 ///
-/// The robot's extensions are included: factors on stiffness, damping and mass (the stiffest joint counts, a lower bound of the limit); point masses; a compliant clamp (implicit, so it adds `h²/c` at the
-/// base); dry friction of the joints with its slope at rest; curves of their moment with their steepest slope; springs with a limit; viscous friction on the floor (an upper bound); material loss, by the spectral radius
+/// The robot's extensions are included: factors on stiffness, damping and mass (the stiffest joint counts, a lower bound of the limit); point masses; a clamp that turns or shifts (implicit, so it adds `h²/c` at the
+/// base); dry friction of the joints with its slope at rest; curves of their moment with their steepest slope; springs with a limit; tapes and cables, taut and at rest; viscous friction on the floor (an upper bound); material loss, by the spectral radius
 /// of a step at frequencies up to the highest. Hardening is left to [`stable_step_at`]. Air drag is neglected: its rate is below 1 % of 1/h at all
 /// speeds that Bullet allows.
 ///
@@ -172,6 +206,7 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
                 4.0 * h * viscous * below * below,
                 -h * (2.0 * damping + h * stiffness),
                 h * h * chain.clamp.unwrap_or(0.0),
+                h,
             )
     };
     // Limit of the last body alone: √(c² + 4ω²) − c without cancellation.
@@ -348,6 +383,11 @@ mod tests {
     #[test]
     fn bullet_is_stable_just_below_the_stable_step_and_not_above_it_with_every_effect() {
         let base = Extensions::default();
+        // Two that pull against each other, both taut.
+        let pair = |damping: f64| {
+            let cable = |side: f64| Attachment { position: 9.0, level: -side, side, stiffness: 3e6, damping, friction: 0.0 };
+            [cable(1.0), cable(-1.0)]
+        };
         let cases = [
             ("plain", base.clone()),
             ("damping", Extensions { damping_scale: 8.889, ..base.clone() }),
@@ -356,7 +396,10 @@ mod tests {
             ("tip mass", Extensions { point_masses: vec![PointMass { mass: 5.0, position: 9.0 }], ..base.clone() }),
             ("dry friction", Extensions { dry_friction: 100.0, ..base.clone() }),
             ("loss", Extensions { loss: [0.2; LOSS_TIMES.len()], ..base.clone() }),
-            ("clamp", Extensions { clamp_compliance: 1e-6, ..base }),
+            ("clamp", Extensions { clamp_compliance: 1e-6, ..base.clone() }),
+            ("clamp that shifts", Extensions { clamp_shift: 1e-5, ..base.clone() }),
+            ("cables", Extensions { attachments: pair(0.0).to_vec(), ..base.clone() }),
+            ("cables with dampers", Extensions { attachments: pair(1e-3).to_vec(), ..base }),
         ];
         for (name, extensions) in cases {
             let mut robot = robot(1, 3, Mount::Clamped, 0.02);

@@ -237,6 +237,24 @@ impl World {
         self.checked(code, &message)
     }
 
+    /// Lets what ties the base of `body` also give in z, by `compliance` (cm/dyn) times the force on it, with a damper of `damping_time` (s) times the
+    /// spring's stiffness. Both are implicit.
+    ///
+    /// # Errors
+    /// [`BulletError::ForeignBody`], [`BulletError::Value`] for a compliance that is not positive or a negative damping time, or [`BulletError::Refused`] for a
+    /// body that is no chain of links or that nothing ties.
+    pub fn set_constraint_shift(&mut self, body: BodyId, compliance: f64, damping_time: f64) -> Result<(), BulletError> {
+        self.links_of(body)?;
+        positive("a compliance (cm/dyn)", &[compliance])?;
+        not_negative("a damping time (s)", damping_time)?;
+        let mut message = Message::new();
+        // SAFETY: the body's index is valid in this world (links_of); the message's length is its own.
+        let code = unsafe {
+            sys::bs_constraint_shift_set(self.pointer(), body.index, compliance, damping_time, message.0.as_mut_ptr(), 256)
+        };
+        self.checked(code, &message)
+    }
+
     /// Sets gravity (cm/s²).
     ///
     /// # Errors

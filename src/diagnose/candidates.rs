@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::effects::Place;
 
-    const BENCH: Bench = Bench { is_clamped: true, is_on_floor: true, actuators: 5, markers: 3 };
+    const BENCH: Bench = Bench { is_clamped: true, is_on_floor: true, actuators: 5, markers: 3, runs: 5 };
     const VISITED: Visited = Visited {
         volts: [-1500.0, 400.0],
         curvature: 5.0,

@@ -248,12 +248,12 @@ pub struct Observation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// Chosen by [`split`](super::search::split).
+    /// Chosen by [`split`](super::split::split).
     #[default]
     Auto,
     /// Parameters are fitted to it.
     Fit,
-    /// Models are judged on it.
+    /// Causes are selected on it, or it judges the result.
     HeldOut,
 }
 

@@ -36,6 +36,16 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
+/// What judges the models: the runs behind every figure of a gain and of a held-out error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JudgedBy {
+    /// Runs that neither fit nor selection saw.
+    JudgeRuns,
+    /// Each of four folds of the runs in turn, left out of selection and fit: there are too few runs to keep some.
+    CrossValidation,
+}
+
 /// What an adopted cause counts for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -68,12 +78,10 @@ pub struct Adopted {
     /// Share of resamples that leave out one or two runs in which it is chosen, by linear estimates (0 to 1); none with few runs.
     pub stability: Option<f64>,
     /// The curve of a free form.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
     /// The named causes that were tried in the stead of the place's free form, nearest first.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub nearest: Vec<Nearest>,
-    /// Share of the held-out χ² above the noise that it removes (0 to 1).
+    /// Share of χ² above the noise that it removes from the runs that judge (0 to 1).
     pub gain_heldout: f64,
     /// Parameters that were given: name and value.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -104,7 +112,7 @@ pub struct Curve {
 pub struct Nearest {
     /// Its name.
     pub id: String,
-    /// Share of what the free form takes on held-out runs that it leaves (0 to 1).
+    /// Share of what the free form takes on select runs that it leaves (0 to 1).
     pub left: f64,
 }
 
@@ -113,7 +121,7 @@ pub struct Nearest {
 pub struct RunError {
     /// The run.
     pub id: String,
-    /// `fit` or `held-out`.
+    /// `fit`, `select` or `judge`.
     pub role: &'static str,
     /// Root mean square residual (mm).
     pub rmse_mm: f64,
@@ -126,9 +134,9 @@ pub struct RunError {
 pub struct Stage {
     /// Root mean square residual of all runs (mm).
     pub rmse_mm: f64,
-    /// Root mean square residual of the held-out runs (mm).
+    /// Root mean square residual of the runs that judge, or of the folds of the cross-validation (mm).
     pub rmse_heldout_mm: f64,
-    /// Its 95 % confidence interval (mm), by a jackknife over held-out runs.
+    /// Its 95 % confidence interval (mm), by a jackknife over these runs.
     pub rmse_heldout_ci95_mm: [f64; 2],
     /// Errors of each run.
     pub runs: Vec<RunError>,
@@ -146,7 +154,7 @@ pub struct Ranked {
     /// Its form, for causes with several.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub form: String,
-    /// Root mean square residual of the held-out runs with it (mm).
+    /// Root mean square residual of the select runs with it (mm).
     pub rmse_heldout_mm: f64,
     /// Change of BIC against re-tuned constants alone; negative is better.
     pub delta_bic: f64,
@@ -173,6 +181,23 @@ pub struct RunFault {
     pub value: f64,
     /// Its standard deviation.
     pub sd: f64,
+}
+
+/// What was found of the bench: standard deviations between runs, 0 for a fault that is off.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct BenchFound {
+    /// Of the clock of the rows against that of the voltages (ms).
+    pub clock_ms: f64,
+    /// Of the zero of each channel (mm).
+    pub zero_mm: f64,
+    /// Of the gain of the inputs (–).
+    pub gain: f64,
+    /// Of the drift of each channel (mm/s).
+    pub drift_mm_per_s: f64,
+    /// Correlation time of the noise (s); 0 for white noise.
+    pub noise_correlation_s: f64,
+    /// Every fault that is not off, run by run.
+    pub faults: Vec<BenchFault>,
 }
 
 /// A fault of the bench that differs from run to run.
@@ -213,10 +238,10 @@ pub struct Diagnosis {
     pub noise_mm: f64,
     /// Share of the noise's variance that is correlated from row to row (–).
     pub noise_correlated: f64,
-    /// Its correlation time (s); 0 for white noise.
-    pub noise_correlation_time_s: f64,
+    /// What judges the models: behind `gain_heldout` and `rmse_heldout_mm`; none of single numbers.
+    pub judged_by: Option<JudgedBy>,
     /// Faults of the bench that differ from run to run, as far as the data ask for them.
-    pub bench: Vec<BenchFault>,
+    pub bench: BenchFound,
     /// The nominal model.
     pub baseline: Stage,
     /// The nominal model with re-tuned constants and refined discretisation.

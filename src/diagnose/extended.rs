@@ -62,7 +62,7 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
         config.effect.extend(discretisation);
     }
     for term in &model.terms {
-        let Ok(applied) = plant.applied(term) else { continue };
+        let Ok(applied) = plant.applied_in(term, run) else { continue };
         let pairs = applied.effect.parameters.iter().zip(&applied.values);
         let parameters = pairs.filter(|(_, v)| v.is_finite()).map(|(p, v)| (p.name, *v));
         config.effect.push(EffectConfig::new(applied.effect, parameters));
@@ -134,9 +134,9 @@ fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
 fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
     let channels = plant.channels();
     let head = ["run", "role", "channel", "t_s", "measured_mm", "nominal_mm", "calibrated_mm", "extended_mm", "used"];
-    let rows = outcome.split.all().into_iter().flat_map(|run| {
+    let rows = (0..plant.signals().len()).flat_map(|run| {
         let signal = &plant.signals()[run];
-        let role = if outcome.split.held.contains(&run) { "held-out" } else { "fit" };
+        let role = outcome.split.role(run);
         let channels = &channels;
         (0..signal.values.len()).map(move |i| {
             let used = outcome.used[run][i];

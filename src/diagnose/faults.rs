@@ -1,8 +1,8 @@
 //! What was found of the bench and of the noise, as parts of a diagnosis.
 
 use super::DiagnoseError;
-use super::bench::KINDS;
-use super::diagnosis::{BenchFault, RunFault};
+use super::bench::{KINDS, Spread};
+use super::diagnosis::{BenchFault, BenchFound, RunFault};
 use super::fit::Estimator;
 use super::noise::Noise;
 use super::plant::{Model, Plant};
@@ -19,7 +19,7 @@ const NAMES: [(&str, &str, f64); KINDS] = [
 ];
 
 /// The faults of the bench under `model` that are not off.
-pub(super) fn found(estimator: &Estimator, model: &Model) -> Result<Vec<BenchFault>, DiagnoseError> {
+pub(super) fn found(estimator: &Estimator, model: &Model) -> Result<BenchFound, DiagnoseError> {
     let plant = estimator.plant;
     let channels = plant.channels();
     let runs = estimator.found_faults(model)?;
@@ -44,7 +44,15 @@ pub(super) fn found(estimator: &Estimator, model: &Model) -> Result<Vec<BenchFau
             runs: all,
         }
     };
-    Ok((0..KINDS).filter(|kind| model.spread.of[*kind] > 0.0).map(of).collect())
+    let spread = |kind: usize| NAMES[kind].2 * model.spread.of[kind];
+    Ok(BenchFound {
+        clock_ms: spread(Spread::CLOCK),
+        zero_mm: spread(Spread::ZERO),
+        gain: spread(Spread::GAIN),
+        drift_mm_per_s: spread(Spread::DRIFT),
+        noise_correlation_s: if estimator.noise.correlated > 0.0 { estimator.noise.time_s } else { 0.0 },
+        faults: (0..KINDS).filter(|kind| model.spread.of[*kind] > 0.0).map(of).collect(),
+    })
 }
 
 /// Remarks on the bench and the noise, in words.

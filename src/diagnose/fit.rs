@@ -80,11 +80,8 @@ struct Step {
 
 impl Linearised {
     fn new((residuals, derivatives): (Vec<Residuals>, Derivatives), is_by_differences: bool) -> Self {
-        let n = derivatives.len();
         let chi2 = residuals.iter().map(|r| sum_of_squares(r)).sum();
-        let gradient = DVector::from_fn(n, |i, _| dot(&derivatives[i], &residuals));
-        let mut information = DMatrix::from_fn(n, n, |i, j| if i <= j { dot(&derivatives[i], &derivatives[j]) } else { 0.0 });
-        information.fill_lower_triangle_with_upper_triangle();
+        let (gradient, information) = normal_equations(&residuals, &derivatives);
         Self { residuals, derivatives, chi2, gradient, information, is_by_differences }
     }
 
@@ -266,15 +263,20 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn plain_residuals(&self, model: &Model) -> Result<Vec<Residuals>, DiagnoseError> {
-        let of = |run: usize| {
-            let nuisance = self.nuisance(model, run);
-            let mut residuals = self.plain(model, run, &nuisance)?;
-            if let Some(columns) = self.faults.get(run) {
-                columns.take_from(&model.spread, &self.misfit(model, run, &nuisance)?, &mut residuals);
-            }
-            Ok(residuals)
-        };
-        (0..self.plant.signals().len()).into_par_iter().map(of).collect()
+        (0..self.plant.signals().len()).into_par_iter().map(|run| self.plain_residuals_of(model, run)).collect()
+    }
+
+    /// [`plain_residuals`](Self::plain_residuals) of one run.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn plain_residuals_of(&self, model: &Model, run: usize) -> Result<Residuals, DiagnoseError> {
+        let nuisance = self.nuisance(model, run);
+        let mut residuals = self.plain(model, run, &nuisance)?;
+        if let Some(columns) = self.faults.get(run) {
+            columns.take_from(&model.spread, &self.misfit(model, run, &nuisance)?, &mut residuals);
+        }
+        Ok(residuals)
     }
 
     /// Residuals of several runs, in σ.
@@ -731,6 +733,15 @@ pub fn sum_of_squares(values: &[f64]) -> f64 {
 /// Inner product.
 pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Half the gradient of χ² and the information JᵀJ, of residuals (runs × values) with their derivatives.
+pub(super) fn normal_equations(residuals: &[Residuals], derivatives: &Derivatives) -> (DVector<f64>, DMatrix<f64>) {
+    let n = derivatives.len();
+    let gradient = DVector::from_fn(n, |i, _| dot(&derivatives[i], residuals));
+    let mut information = DMatrix::from_fn(n, n, |i, j| if i <= j { dot(&derivatives[i], &derivatives[j]) } else { 0.0 });
+    information.fill_lower_triangle_with_upper_triangle();
+    (gradient, information)
 }
 
 /// Inner product over all runs.

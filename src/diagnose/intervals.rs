@@ -121,10 +121,10 @@ pub(super) fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, Diagn
     if !own.is_empty() {
         (search.progress)("the effect of the discretisation");
         if at > 0 {
-            others.push(search.fitted(&Model { resolution: resolutions[at - 1], ..best.model().clone() })?);
+            others.push(search.ranked(&Model { resolution: resolutions[at - 1], ..best.model().clone() })?);
         }
-        others.push(search.fitted(&Model { fine: false, ..best.model().clone() })?);
-        others.push(search.fitted(&search.with_constants(best.model()))?);
+        others.push(search.ranked(&Model { fine: false, ..best.model().clone() })?);
+        others.push(search.ranked(&search.with_constants(best.model()))?);
     }
     for other in &others {
         for (moved, (a, b)) in moved.iter_mut().zip(own.iter().zip(values_of(other.model()))) {

@@ -2,7 +2,7 @@
 //!
 //! [`dataset`] reads runs, [`quality`] estimates noise and masks outliers and frozen markers, [`voltage`] interpolates commands between rows. A
 //! [`plant`] is the measured system with its model; [`robot`] is the plant of this crate's robots. [`fit`] is bounded least squares; [`search`] selects
-//! causes on held-out runs; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
+//! causes on runs that no fit saw, by their [`split`]; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
 //! [residual tests](residual_tests) of the final model, in a [`diagnosis`]. [`protocols`] proposes the next measurement; [`report`] and [`extended`]
 //! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers.
 //!
@@ -11,8 +11,10 @@
 //! Mech. Syst. Signal Process. 20 (2006) 505; J. Brynjarsdóttir and A. O'Hagan, "Learning about physical parameters: the importance of model
 //! discrepancy", Inverse Problems 30 (2014) 114007.
 
+mod adopted;
 pub mod bench;
 mod candidates;
+mod causes;
 pub mod combinations;
 mod curve;
 pub mod dataset;
@@ -42,9 +44,13 @@ mod response;
 pub mod robot;
 mod run_csv;
 pub mod search;
+pub mod split;
 mod stability;
 mod summary;
+mod ties;
 mod track;
+mod unseen;
+mod verdict;
 mod visited;
 pub mod voltage;
 

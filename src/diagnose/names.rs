@@ -4,8 +4,11 @@ use super::diagnosis::{Adopted, Estimate};
 use crate::model::{Laminate, Robot};
 use crate::number::{digits_for, fixed};
 
-/// The name of a cause.
+/// The name of a cause, or of a set of causes with plus signs between them.
 pub fn cause(id: &str) -> String {
+    if let Some((first, rest)) = id.split_once('+') {
+        return format!("{} with {}", cause(first), cause(rest));
+    }
     match id {
         "stiffness" => "bending stiffness".into(),
         "actuation-gain" => "curvature per volt".into(),
@@ -14,6 +17,9 @@ pub fn cause(id: &str) -> String {
         "discretisation" => "number of joints".into(),
         "clamp-compliance" => "compliance of the clamp".into(),
         "stiffness-softening" => "softening of the stiffness".into(),
+        "clamp-shift" => "shift of the clamp".into(),
+        "stiffness-drift" => "drift of the stiffness".into(),
+        "gain-drift" => "drift of the curvature per volt".into(),
         _ => id.replace('-', " "),
     }
 }
@@ -56,7 +62,17 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         "air-drag" | "stiffness-softening" | "structural-damping" | "polarity-asymmetry" => {
             fitted.nth(1).map_or("", |_| "with an exponent").into()
         }
+        "remanence" => fitted.nth(2).map_or("", |_| "that saturates").into(),
         "dry-friction" => fitted.nth(1).map_or("", |_| "with presliding").into(),
+        "cable-drag" => {
+            let side = if given("below") == Some(1.0) { "taut below a level" } else { "taut above a level" };
+            match fitted.nth(2) {
+                Some("drag_mn") => format!("{side}, with friction"),
+                Some(_) => format!("{side}, with a damper"),
+                None => side.into(),
+            }
+        }
+        "clamp-shift" => fitted.nth(1).map_or("", |_| "with a damper").into(),
         "clamp-compliance" => match fitted.nth(1) {
             Some("hardening_per_rad") => "that hardens".into(),
             Some(_) => "with a damper".into(),
@@ -96,6 +112,18 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("creep", "per_decade") => "growth in a decade of time".into(),
         ("creep", "fastest_s") => "fastest time constant".into(),
         ("creep", "power") => "exponent of the growth".into(),
+        ("remanence", "share") => "share of the voltage that stays".into(),
+        ("remanence", "coercive_v") => "coercive voltage".into(),
+        ("remanence", "saturation_v") => "largest offset".into(),
+        ("clamp-shift", "compliance_mm_per_n") => "shift of the clamp per force".into(),
+        ("cable-drag", "stiffness_n_per_m") => "stiffness of the cable".into(),
+        ("cable-drag", "drag_mn") => "friction of the cable".into(),
+        ("cable-drag", "damping_s") => "damping time of the cable".into(),
+        ("cable-drag", "level_mm") => "height from which on it is taut".into(),
+        ("cable-drag", "position_mm") => "distance from the left end".into(),
+        ("wake-up", "change") => "change of the gain at the start".into(),
+        ("wake-up", "path_kv") => "path of the voltage to 1/e of it".into(),
+        (_, "per_run") => "change from run to run".into(),
         ("passive-margin", _) => "passive share of an actuator".into(),
         ("field-dependent-gain", "slope_per_kv") => "slope of the gain".into(),
         ("field-dependent-gain", "curvature_per_kv2") => "curvature of the gain".into(),
@@ -200,7 +228,7 @@ mod tests {
     #[test]
     fn every_form_of_a_cause_has_a_label_of_its_own() {
         for preset in ["cantilever-dc", "static-shape"] {
-            let mut labels: Vec<String> = candidates(&Bench::new(&robot(preset), 2), &Visited::NOTHING)
+            let mut labels: Vec<String> = candidates(&Bench::new(&robot(preset), 2, 5), &Visited::NOTHING)
                 .iter()
                 .map(|c| with_form(c.id, &form(c.id, &c.fixed, c.parameters.iter().map(|p| p.name))))
                 .collect();

@@ -10,7 +10,7 @@ use super::diagnosis::Nearest;
 use super::plant::{Candidate, Model, Term};
 use super::search::{PROMISING_IN_PLACE, Scored, Search};
 
-/// A name stands if it takes this share of what the free form takes on held-out runs.
+/// A name stands if it takes this share of what the free form takes on select runs.
 const LEAST_TAKEN: f64 = 0.95;
 /// Held-out runs show a place if the free form takes there this share of what it takes in all, both per value.
 const LEAST_SHOWN: f64 = 0.1;
@@ -102,13 +102,14 @@ impl<'a> Place<'a> {
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
     fn single(&self) -> Result<Vec<Attempt>, DiagnoseError> {
-        let screened = self.search.screen_of(&self.bare, |candidate| self.is_name(candidate))?.ranked;
+        let screened = self.search.screen_of(&self.bare, |candidate| self.is_name(candidate))?;
         let own = PROMISING_IN_PLACE * (self.bare.total() - self.best.total());
-        let rivals: Vec<&(f64, Model)> = screened.iter().filter(|(_, model)| self.is_rival(model)).collect();
+        let rivals: Vec<&(f64, Model)> = screened.ranked.iter().filter(|(_, model)| self.is_rival(model)).collect();
         // The nearest one is shown even if it is far.
         let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
         let models = self.search.finalists(promising, MOST_NAMES);
-        let mut tried: Vec<Attempt> = models.iter().filter_map(|model| self.attempt(model)).collect();
+        let start = |model: &Model| self.search.start_beyond(model, &screened).ok();
+        let mut tried: Vec<Attempt> = models.iter().filter_map(|model| self.attempt(&start(model)?)).collect();
         if tried.iter().all(|attempt| attempt.taken < LEAST_TAKEN) {
             // Constants that the free form did not need may make up for what a name lacks.
             let most = tried.iter().max_by(|a, b| a.taken.total_cmp(&b.taken));
@@ -138,9 +139,14 @@ impl<'a> Place<'a> {
             }
         }
         for first in firsts {
-            let screened = self.search.screen_of(&first.scored, |candidate| self.is_name(candidate))?.ranked;
-            let rivals = screened.iter().filter(|(_, model)| self.is_rival(model));
-            pairs.extend(self.search.finalists(rivals, MOST_SECOND).iter().filter_map(|model| self.attempt(model)));
+            let screened = self.search.screen_of(&first.scored, |candidate| self.is_name(candidate))?;
+            let rivals = screened.ranked.iter().filter(|(_, model)| self.is_rival(model));
+            pairs.extend(
+                self.search
+                    .finalists(rivals, MOST_SECOND)
+                    .iter()
+                    .filter_map(|model| self.attempt(&self.search.start_beyond(model, &screened).ok()?)),
+            );
         }
         Ok(pairs)
     }
@@ -156,12 +162,12 @@ impl<'a> Place<'a> {
         Ok(Some(alone).filter(|alone| self.taken(alone) >= LEAST_TAKEN))
     }
 
-    /// Share of what the free form takes on held-out runs that another model takes; on all runs where the held-out ones hardly show the place.
+    /// Share of what the free form takes on select runs that another model takes; on all runs where the select runs hardly show the place.
     fn taken(&self, scored: &Scored) -> f64 {
         let count = |runs: &[usize]| self.search.estimator.count(runs).max(1) as f64;
         let whole = (self.bare.total() - self.best.total()) / count(&self.search.split.all());
-        let held = (self.bare.held - self.best.held) / count(&self.search.split.held);
-        let of = |scored: &Scored| if held > LEAST_SHOWN * whole { scored.held } else { scored.total() };
+        let held = (self.bare.select - self.best.select) / count(&self.search.split.select);
+        let of = |scored: &Scored| if held > LEAST_SHOWN * whole { scored.select } else { scored.total() };
         (of(&self.bare) - of(scored)) / (of(&self.bare) - of(&self.best)).max(f64::MIN_POSITIVE)
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::diagnosis::{Diagnosis, Part, Stage, Verdict};
+use super::diagnosis::{Diagnosis, JudgedBy, Part, Stage, Verdict};
 use super::fit::sum_of_squares;
 use super::names;
 use super::picture;
@@ -67,11 +67,16 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
     let mut out = heading(d);
     let _ = writeln!(
         out,
-        "<p class=\"small\">Noise {} {unit}; of the misfit above it {} % is left. Models were fitted to {} runs and judged on {} others.</p>",
+        "<p class=\"small\">Noise {} {unit}; of the misfit above it {} % is left. Models were fitted to {} runs, causes were selected on {} \
+         others, and the result is judged {}.</p>",
         significant(d.noise_mm, 3),
         fixed(100.0 * d.unexplained_fraction, 1),
         outcome.split.fit.len(),
-        outcome.split.held.len()
+        outcome.split.select.len(),
+        match d.judged_by {
+            Some(JudgedBy::JudgeRuns) => format!("on {} that neither saw", outcome.split.judge.len()),
+            _ => "by nested cross-validation".into(),
+        }
     );
     for line in &d.unexplained {
         let _ = writeln!(out, "<p class=\"bad\">What is left: {}</p>", prose(line));
@@ -147,7 +152,7 @@ fn curves(out: &mut String, d: &Diagnosis) {
 
 fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
     let digits = digits_for(d.noise_mm.max(1e-5)) + 1;
-    out.push_str("<h2>The gain, on runs that no fit saw</h2>\n");
+    out.push_str("<h2>The gain, on runs that neither fit nor selection saw</h2>\n");
     let error = format!("#held-out error ({unit})");
     let mut table = Table::new(&["model", &error, "#95 % range", &format!("#all runs ({unit})")]);
     for (name, stage) in [("nominal", &d.baseline), ("re-tuned constants", &d.calibrated), ("extended", &d.extended)] {
@@ -260,8 +265,8 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         let tied = if others.is_empty() { String::new() } else { format!(" Tied with {}.", others.join(", ")) };
         let _ = writeln!(
             out,
-            "<p class=\"small\"><strong>{}</strong> ({}{}{}; <code>id = \"{}\"</code> in files): {} It removes {} % of the held-out error above the \
-             noise.{tied}</p>",
+            "<p class=\"small\"><strong>{}</strong> ({}{}{}; <code>id = \"{}\"</code> in files): {} It takes {} % of the misfit, and removes {} % of \
+             the held-out error above the noise.{tied}</p>",
             escape(&names::cause(&effect.id)),
             effect.kind,
             if effect.role == Part::Minor { "; minor" } else { "" },
@@ -270,6 +275,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
                 .map_or_else(String::new, |share| format!("; chosen in {:.0} % of resamples over runs", 100.0 * share)),
             effect.id,
             prose(&effect.cause),
+            fixed(100.0 * effect.share, 1),
             fixed(100.0 * effect.gain_heldout, 1)
         );
     }
@@ -362,12 +368,12 @@ fn tests(out: &mut String, d: &Diagnosis) {
 }
 
 fn bench(out: &mut String, d: &Diagnosis) {
-    if d.bench.is_empty() {
+    if d.bench.faults.is_empty() {
         return;
     }
     out.push_str("<h2>Faults of the bench, run by run</h2>\n");
     let mut table = Table::new(&["fault", "run", "channel", "#value", "#standard deviation", "unit"]);
-    for fault in &d.bench {
+    for fault in &d.bench.faults {
         for run in &fault.runs {
             table.row([
                 fault.id.into(),
@@ -383,6 +389,7 @@ fn bench(out: &mut String, d: &Diagnosis) {
         out,
         "<p>They are nuisance parameters with a normal prior and no causes. {}.</p><details><summary>All values</summary>\n{}</details>",
         d.bench
+            .faults
             .iter()
             .map(|fault| {
                 let unit = if fault.unit.is_empty() { String::new() } else { format!(" {}", fault.unit) };

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::fit::{Residuals, inner};
 use super::plant::{Plant, Signal};
-use super::search::Split;
 
 /// A test of a run's residuals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -177,11 +176,10 @@ fn harmonic(trace: &Trace, frequency: f64) -> (f64, f64) {
 }
 
 /// All residual tests, of each run and across runs, on the values that are `used`. The list of tests does not depend on the residuals (σ).
-pub fn residual_tests(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<ResidualTest> {
+pub fn residual_tests(plant: &dyn Plant, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<ResidualTest> {
     let mut tests = Vec::new();
     let (mut gains, mut runs) = (Vec::new(), 0);
-    for run in split.all() {
-        let (signal, used, r) = (&plant.signals()[run], &used[run], &residuals[run]);
+    for ((signal, used), r) in plant.signals().iter().zip(used).zip(residuals) {
         let Some([trace, longest]) = trace(signal, used, r) else { continue };
         runs += 1;
         let mut add = |name: &str, statistic: f64, limit: f64, good: &str, bad: &str| {
@@ -312,21 +310,20 @@ fn loop_area(trace: &Trace) -> (f64, f64) {
 }
 
 /// Describes unexplained residuals (σ) in words: where they are, and their shape in the worst runs.
-pub fn describe(plant: &dyn Plant, split: &Split, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<String> {
+pub fn describe(plant: &dyn Plant, used: &[Vec<bool>], residuals: &[Residuals]) -> Vec<String> {
     let mut words = Vec::new();
-    let all = split.all();
     let signals = plant.signals();
     let count = |run: usize| used[run].iter().filter(|used| **used).count() as f64;
     let excess = |run: usize| (residuals[run].iter().map(|r| r * r).sum::<f64>() - count(run)).max(0.0);
-    let whole: f64 = all.iter().map(|run| excess(*run)).sum();
-    let mut order = all.clone();
+    let whole: f64 = (0..signals.len()).map(excess).sum();
+    let mut order: Vec<usize> = (0..signals.len()).collect();
     order.sort_by(|a, b| excess(*b).total_cmp(&excess(*a)));
     let worst: Vec<usize> = order.iter().copied().filter(|run| excess(*run) > 0.1 * whole).collect();
     let share = |run: &usize| format!("{} ({:.0} %)", signals[*run].id, 100.0 * excess(*run) / whole.max(1e-9));
     words.push(format!("where: {}", worst.iter().map(share).collect::<Vec<_>>().join(", ")));
-    let clean = all.iter().filter(|run| excess(**run) < 0.3 * count(**run)).count();
+    let clean = (0..signals.len()).filter(|run| excess(*run) < 0.3 * count(*run)).count();
     if clean > 0 {
-        words.push(format!("{clean} of {} runs are explained to the noise", all.len()));
+        words.push(format!("{clean} of {} runs are explained to the noise", signals.len()));
     }
     for run in worst.iter().take(4) {
         let Some([trace, _]) = trace(&signals[*run], &used[*run], &residuals[*run]) else { continue };

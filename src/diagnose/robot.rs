@@ -6,7 +6,7 @@ use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
 use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
-use super::plant::{Candidate, FreeCurve, Model, Nuisance, Plant, Signal, Term};
+use super::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::response::Sine;
 use super::track::{ON_STEP, track};
@@ -169,7 +169,7 @@ impl RobotPlant {
             Visit { robot, start, drive, step: *step, steps: self.steps_of(run, *step) }
         };
         let visits: Vec<_> = (0..self.runs.len()).map(visit).collect();
-        let bench = effects::Bench::new(&self.robot, self.markers.len());
+        let bench = effects::Bench::new(&self.robot, self.markers.len(), self.runs.len());
         // A nominal model that cannot be simulated is reported by the first prediction.
         let mut all = visited(&visits).map_or(Vec::new(), |visited| {
             let (coordinate, axes) = self.seen();
@@ -274,8 +274,8 @@ impl RobotPlant {
             let position = robot.material.actuator_length * robot.actuators as f64;
             robot.extensions.point_masses.push(PointMass { mass: scene.added, position });
         }
-        let Setup { robot, drive, chain, view } =
-            self.setup(robot, &model.terms, model.resolution, scene.drive.clone(), scene.duration)?;
+        let effects = model.terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
+        let Setup { robot, drive, chain, view } = setup(robot, &effects, model.resolution, scene.drive.clone(), scene.duration)?;
         let times: Vec<f64> = (0..rows).map(|row| (scene.duration * row as f64 / rows as f64 - view.delay).max(0.0)).collect();
         let step = self.runs.iter().map(|run| run.step).fold(1e-3, f64::min);
         let start = if scene.hung > 0.0 { Start::Hung(scene.hung) } else { Start::Settled };
@@ -295,8 +295,23 @@ impl RobotPlant {
     pub fn applied(&self, term: &Term) -> Result<Applied, DiagnoseError> {
         let candidate = &self.candidates[term.candidate];
         let effect = effects::find(candidate.id).ok_or_else(|| EffectError::Unknown(candidate.id.into()))?;
-        let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name, p.value(*x)));
+        // Limits beyond the range that files may give limit nothing: a fit comes near to where the effect vanishes, at infinity.
+        let within = |name: &str, value: f64| {
+            let known = effect.parameters.iter().find(|p| p.name == name)?;
+            let is_beyond = known.off.is_some_and(f64::is_infinite) && !(known.bounds[0]..=known.bounds[1]).contains(&value);
+            if is_beyond { known.off } else { Some(value) }
+        };
+        let value = |(p, x): (&Free, &f64)| (p.name, within(p.name, p.value(*x)).unwrap_or(p.value(*x)));
+        let free = candidate.parameters.iter().zip(&term.x).map(value);
         Ok(effect.with(free.chain(candidate.fixed.iter().copied()))?)
+    }
+
+    /// The effect of a term in a run: what drifts from run to run does so in the order of the data set, about the mean of all runs.
+    ///
+    /// # Errors
+    /// As [`applied`](Self::applied).
+    pub fn applied_in(&self, term: &Term, run: usize) -> Result<Applied, DiagnoseError> {
+        Ok(self.applied(term)?.in_run(run as f64 - 0.5 * (self.runs.len() as f64 - 1.0)))
     }
 }
 
@@ -409,24 +424,16 @@ struct Setup {
     view: View,
 }
 
-impl RobotPlant {
-    /// The robot with the terms and joints of a model, driven by `command` for `duration` (s).
-    fn setup(
-        &self,
-        mut robot: Robot,
-        terms: &[Term],
-        resolution: f64,
-        command: Table,
-        duration: f64,
-    ) -> Result<Setup, DiagnoseError> {
-        let effects = terms.iter().map(|term| self.applied(term)).collect::<Result<Vec<_>, _>>()?;
-        robot.motors_per_actuator = resolution as usize;
-        let mut drive = Drive { waveform: Waveform::Table(command), positive_gain: 1.0, delay: 0.0 };
-        effects::apply(&effects, &mut robot, &mut drive)?;
-        let chain = SignalChain::new(&effects, robot.actuators, duration);
-        Ok(Setup { robot, drive, chain, view: View::new(&effects) })
-    }
+/// The robot with `effects` and a number of joints, driven by `command` for `duration` (s).
+fn setup(mut robot: Robot, effects: &[Applied], resolution: f64, command: Table, duration: f64) -> Result<Setup, DiagnoseError> {
+    robot.motors_per_actuator = resolution as usize;
+    let mut drive = Drive { waveform: Waveform::Table(command), positive_gain: 1.0, delay: 0.0 };
+    effects::apply(effects, &mut robot, &mut drive)?;
+    let chain = SignalChain::new(effects, robot.actuators, duration);
+    Ok(Setup { robot, drive, chain, view: View::new(effects) })
+}
 
+impl RobotPlant {
     fn predict_with(
         &self,
         terms: &[Term],
@@ -436,12 +443,13 @@ impl RobotPlant {
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
         let Run { robot, markers, command, start, response, has_clock, .. } = &self.runs[run];
+        let effects = terms.iter().map(|term| self.applied_in(term, run)).collect::<Result<Vec<_>, _>>()?;
         if let Some(response) = response {
-            return self.respond(response, &self.runs[run], terms, resolution, nuisance, step);
+            return self.respond(response, &self.runs[run], &effects, resolution, nuisance, step);
         }
         let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
         let Setup { robot, drive, chain, view } =
-            self.setup(robot.clone(), terms, resolution, table, self.steps_of(run, step) as f64 * step)?;
+            setup(robot.clone(), &effects, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let signal = &self.signals[run];
         // Channels share their times.
         let mut times = signal.times.clone();
@@ -477,7 +485,7 @@ impl RobotPlant {
         &self,
         response: &Response,
         run: &Run,
-        terms: &[Term],
+        effects: &[Applied],
         resolution: f64,
         nuisance: &Nuisance,
         step: f64,
@@ -489,7 +497,7 @@ impl RobotPlant {
             let sine = Sine::new(response, *frequency, &run.robot, first, applied);
             let duration = sine.duration();
             let Setup { robot, drive, chain, view } =
-                self.setup(run.robot.clone(), terms, resolution, sine.table.clone(), duration)?;
+                setup(run.robot.clone(), effects, resolution, sine.table.clone(), duration)?;
             let tracks = track(&robot, &run.start, &drive, chain, step, marker, &sine.times(-view.delay))?;
             let samples: Vec<f64> = tracks.into_iter().map(|at| 10.0 * view.of(at)[response.channel % 2]).collect();
             Ok(sine.parts(&samples, self.exposure))

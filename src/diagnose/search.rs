@@ -1,38 +1,43 @@
 //! Selection of causes: screening, forward selection, backward elimination and replacement.
 //!
-//! Models are fitted to the fit runs and judged on the held-out ones. The constants of the nominal model are free from the beginning, so that a
+//! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, selection and replacement share the state of one search; its last 120 lines are tests.
+//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 120 lines are tests.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::dataset::Role;
-use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, sum_of_squares};
+use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::noise;
-use super::plant::{Candidate, Free, Model, Plant, Signal, Term};
+use super::plant::{Candidate, Free, Model, Term};
+use super::split::Split;
 
-/// A cause is adopted if the held-out χ² falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
+/// A cause is adopted if χ² of the select runs falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
 pub(super) const LEAST_GAIN: f64 = 0.03;
 /// ... and by this share of what re-tuned constants leave unexplained, since other causes could fit the trace of one whose equation is not quite
 /// right; ...
 const LEAST_SHARE: f64 = 0.004;
-/// Nothing more is sought once no more than this share of it is left: further causes would be minor, and would parcel out what the laws of the
-/// others do not follow.
-pub(super) const SOUGHT: f64 = 0.02;
 /// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
 const LEAST_BIC: f64 = 10.0;
-/// A cause that no held-out run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
+/// Nothing more is sought once no more than this share of what re-tuned constants leave is left, and less than [`VISIBLE`]: further causes would be
+/// minor, and would parcel out what the laws of the others do not follow.
+pub(super) const SOUGHT: f64 = 0.02;
+/// Misfit (χ² per value above 1) of half the noise.
+pub(super) const VISIBLE: f64 = 0.25;
+/// A cause that no select run shows is tried on another split if it lowers the fit runs' χ² by this share of the number of values.
 const SEEN_BY_FIT: f64 = 0.1;
+/// A cause whose linear estimate exceeds that by this factor is not left out on trial.
+const CLEARLY: f64 = 3.0;
 /// Two models are tied if their χ² differ by less than this or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
-/// Candidates that are fitted after screening: named ones and free forms.
+/// Candidates that are fitted after screening: named ones, forms of one cause among them, and free forms.
 const FINALISTS: usize = 7;
+const FORMS: usize = 2;
 const FREE_FINALISTS: usize = 3;
 /// Candidates are fitted whose linear estimate is at least this share of the best one's: in a search, among free forms, and in the place of a cause
 /// whose own share is 1.
@@ -41,6 +46,8 @@ const PROMISING_FREE: f64 = 0.4;
 pub(super) const PROMISING_IN_PLACE: f64 = 0.3;
 /// Terms that are left out on trial in a round of elimination, the least significant ones.
 const LEAST_SIGNIFICANT: usize = 3;
+/// Share of the diagonal by which the linear estimate of a start is regularised.
+const LEAST_RIDGE: f64 = 1e-6;
 /// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
@@ -49,24 +56,6 @@ const MOST_TURNS: usize = 10;
 const MOST_SPREADS: usize = 3;
 /// Most causes in addition to the constants.
 const MOST_CAUSES: usize = 6;
-
-/// Fit and held-out runs, by index.
-#[derive(Debug, Clone)]
-pub struct Split {
-    /// Runs to which parameters are fitted.
-    pub fit: Vec<usize>,
-    /// Runs on which models are judged.
-    pub held: Vec<usize>,
-}
-
-impl Split {
-    /// All runs in order.
-    pub fn all(&self) -> Vec<usize> {
-        let mut all = [self.fit.as_slice(), &self.held].concat();
-        all.sort_unstable();
-        all
-    }
-}
 
 /// A fitted model with its residuals on all runs.
 #[derive(Debug, Clone)]
@@ -79,8 +68,8 @@ pub struct Scored {
     pub plain: Vec<Residuals>,
     /// What the spread of the bench's faults costs in each run (log det of [`bench`](super::bench)).
     pub spread_costs: Vec<f64>,
-    /// Cost of the held-out runs: χ² and that of the spread.
-    pub held: f64,
+    /// Cost of the runs that are selected on: χ² and that of the spread.
+    pub select: f64,
     /// Cost of the fit runs.
     pub fitted: f64,
 }
@@ -88,13 +77,7 @@ pub struct Scored {
 impl Scored {
     /// Cost of all runs.
     pub fn total(&self) -> f64 {
-        self.held + self.fitted
-    }
-
-    /// χ² per value above 1, for `count` values in all runs.
-    pub(super) fn above(&self, count: usize) -> f64 {
-        let chi2: f64 = self.residuals.iter().map(|r| sum_of_squares(r)).sum();
-        (chi2 / count as f64 - 1.0).max(0.0)
+        self.select + self.fitted
     }
 
     /// The model.
@@ -119,7 +102,7 @@ pub struct Search<'a> {
     pub estimator: Estimator<'a>,
     /// The runs.
     pub split: Split,
-    /// χ² per value above 1 of re-tuned constants on the held-out runs.
+    /// χ² per value above 1 of re-tuned constants on the select runs.
     pub unexplained: f64,
     /// Models with two causes that cost more are given up; infinite for none.
     pub limit: f64,
@@ -148,12 +131,25 @@ pub struct Screened {
     pub(super) tangents: Vec<DVector<f64>>,
     /// The derivatives by the model's coordinates, of all runs.
     derivatives: Derivatives,
+    /// The model's residuals, and the number of its terms.
+    residuals: Vec<Residuals>,
+    terms: usize,
 }
 
 impl Search<'_> {
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
         self.estimator.plant.candidates()[candidate].id
+    }
+
+    /// χ² of the runs that the search sees, without the cost of the spread.
+    pub(super) fn chi2(&self, scored: &Scored) -> f64 {
+        self.split.all().iter().map(|run| sum_of_squares(&scored.residuals[*run])).sum()
+    }
+
+    /// χ² per value above 1.
+    pub(super) fn above(&self, scored: &Scored) -> f64 {
+        (self.chi2(scored) / self.estimator.count(&self.split.all()) as f64 - 1.0).max(0.0)
     }
 
     /// Cost of a model on all runs, with ln N for each coordinate.
@@ -176,13 +172,25 @@ impl Search<'_> {
         let (residuals, spread_costs): (Vec<_>, Vec<_>) = self.estimator.costs_of(&fit.model, &all)?.into_iter().unzip();
         let sum = |runs: &[usize]| runs.iter().map(|run| sum_of_squares(&residuals[*run]) + spread_costs[*run]).sum();
         Ok(Scored {
-            held: sum(&self.split.held),
+            select: sum(&self.split.select),
             fitted: sum(&self.split.fit),
             plain: self.estimator.plain_residuals(&fit.model)?,
             fit,
             residuals,
             spread_costs,
         })
+    }
+
+    /// A scored model with its residuals on the runs that judge, under their present nuisance parameters.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn with_judged(&self, mut scored: Scored) -> Result<Scored, DiagnoseError> {
+        for run in &self.split.judge {
+            scored.residuals[*run] = self.estimator.residuals(&scored.fit.model, *run)?;
+            scored.plain[*run] = self.estimator.plain_residuals_of(&scored.fit.model, *run)?;
+        }
+        Ok(scored)
     }
 
     /// Fits a model and scores it.
@@ -201,6 +209,14 @@ impl Search<'_> {
         self.score(self.estimator.fit(model, &self.split.fit, Convergence::Full)?)
     }
 
+    /// [`fitted_at_its_spread`](Self::fitted_at_its_spread) to the convergence of [`Convergence::Rank`].
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn ranked_at_its_spread(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+        self.score(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?)
+    }
+
     /// Fits the spread of the bench's faults and a model in turn, from a first fit of the model, and scores it.
     fn with_spread(&self, first: Fit, convergence: Convergence) -> Result<Scored, DiagnoseError> {
         let mut best = self.score(first)?;
@@ -216,17 +232,68 @@ impl Search<'_> {
     }
 
     /// Fits a model to the convergence of [`Convergence::Rank`] and scores it.
-    fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
+    pub(super) fn ranked(&self, model: &Model) -> Result<Scored, DiagnoseError> {
         self.with_spread(self.estimator.fit(model, &self.split.fit, Convergence::Rank)?, Convergence::Rank)
     }
 
     /// [`ranked`](Self::ranked) for a model with terms beyond those that were screened.
     fn ranked_beyond(&self, model: &Model, screened: &Screened) -> Result<Scored, DiagnoseError> {
+        let start = self.start_beyond(model, screened)?;
+        let known = self.known(screened);
+        self.with_spread(self.estimator.fit_beyond(&start, &self.split.fit, &known)?, Convergence::Rank)
+    }
+
+    /// The derivatives of a screening on the fit runs.
+    fn known(&self, screened: &Screened) -> Derivatives {
         let all = self.split.all();
         let at: Vec<usize> = self.split.fit.iter().filter_map(|run| all.binary_search(run).ok()).collect();
         let of_fit_runs = |column: &Vec<Residuals>| at.iter().map(|run| column[*run].clone()).collect();
-        let known: Derivatives = screened.derivatives.iter().map(of_fit_runs).collect();
-        self.with_spread(self.estimator.fit_beyond(model, &self.split.fit, &known)?, Convergence::Rank)
+        screened.derivatives.iter().map(of_fit_runs).collect()
+    }
+
+    /// The start of a fit with terms beyond those that were screened: where the terms and the model's own coordinates together lower χ² most, by
+    /// linear estimates, or on the way there. A term that does what others did for it before leads uphill if these stay as they are.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if `model` cannot be simulated.
+    pub(super) fn start_beyond(&self, model: &Model, screened: &Screened) -> Result<Model, DiagnoseError> {
+        let runs = &self.split.fit;
+        let before: Vec<Residuals> = runs.iter().map(|run| screened.residuals[*run].clone()).collect();
+        let chi2 = |residuals: &[Residuals]| residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>();
+        let moved = self.estimator.residuals_of(model, runs)?;
+        let change = moved.iter().zip(&before).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+        let columns: Derivatives = std::iter::once(change).chain(self.known(screened)).collect();
+        let (gradient, mut information) = normal_equations(&before, &columns);
+        (0..columns.len()).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
+        let mut best = (chi2(&moved), model.clone());
+        let Some(by) = information.lu().solve(&-gradient).filter(|by| by[0] > 0.0 && by.iter().all(|by| by.is_finite())) else {
+            return Ok(best.1);
+        };
+        for share in [1.0, 0.5, 0.25] {
+            let start = self.on_the_way(model, screened.terms, &(&by * share));
+            // A point that cannot be simulated is none to start from.
+            let Ok(residuals) = self.estimator.residuals_of(&start, runs) else { continue };
+            if chi2(&residuals) < best.0 {
+                best = (chi2(&residuals), start);
+            }
+        }
+        Ok(best.1)
+    }
+
+    /// A model with its terms from `first` on moved from their off values by the share `by[0]` of the way to where they are, and the coordinates of the
+    /// terms before moved by the rest of `by`, within their bounds.
+    fn on_the_way(&self, model: &Model, first: usize, by: &DVector<f64>) -> Model {
+        let mut start = model.clone();
+        for (k, (term, parameter)) in coordinates(model).into_iter().enumerate() {
+            let Free { off, bounds: [low, high], .. } = self.candidate(&model.terms[term]).parameters[parameter];
+            let x = &mut start.terms[term].x[parameter];
+            *x = match off {
+                _ if term < first => (*x + by[k + 1]).clamp(low, high),
+                Some(off) => (off + by[0] * (*x - off)).clamp(low, high),
+                None => *x,
+            };
+        }
+        start
     }
 
     /// Alternates fits of nuisance parameters and model until χ² has converged.
@@ -273,20 +340,20 @@ impl Search<'_> {
 
     /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
-        let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
+        let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
         let (_, gain) = self.gap(more, less, runs);
         let count = self.estimator.count(runs) as f64;
         gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
     }
 
-    /// True if a free form is better than a name on held-out runs and by BIC.
+    /// True if a free form is better than a name on the select runs and by BIC.
     fn is_closer(&self, free: &Scored, named: &Scored) -> bool {
         self.judged(free) < self.judged(named) && free.bic() < named.bic() - LEAST_BIC
     }
 
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
     fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
-        let runs = if self.split.held.is_empty() { &self.split.fit } else { &self.split.held };
+        let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
         self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
     }
 
@@ -312,7 +379,9 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn measure_noise(&mut self, scored: &Scored) -> Result<bool, DiagnoseError> {
         let estimator = &mut self.estimator;
-        let Some(noise) = noise::estimate(estimator.plant.signals(), &estimator.used, &scored.plain) else { return Ok(false) };
+        let mut seen = estimator.used.clone();
+        self.split.judge.iter().for_each(|run| seen[*run].fill(false));
+        let Some(noise) = noise::estimate(estimator.plant.signals(), &seen, &scored.plain) else { return Ok(false) };
         if !noise.differs(&estimator.noise) {
             return Ok(false);
         }
@@ -346,11 +415,7 @@ impl Search<'_> {
         let own = from.model().terms.len();
         let mut all = self.fitted(&self.with_constants(from.model()))?;
         while all.model().terms.len() > own {
-            let without = |index: usize| {
-                let mut model = all.model().clone();
-                model.terms.remove(index);
-                self.ranked(&model).ok()
-            };
+            let without = |index: usize| self.ranked(&self.without(&all, index).ok()?).ok();
             let shorter = (own..all.model().terms.len()).filter_map(without);
             let Some(least) = shorter.min_by(|a, b| a.total().total_cmp(&b.total())) else { return Ok(from) };
             if self.is_significant(&all, &least) {
@@ -414,7 +479,8 @@ impl Search<'_> {
             ranked.push((gain, with(base, [moved])));
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(Screened { ranked, columns, rest, tangents: own, derivatives })
+        let (residuals, terms) = (from.residuals.clone(), base.terms.len());
+        Ok(Screened { ranked, columns, rest, tangents: own, derivatives, residuals, terms })
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -447,22 +513,18 @@ impl Search<'_> {
         None
     }
 
-    /// The two screened causes that would lower χ² most together, if by more than twice what the best does alone: other pairs are found one cause
-    /// at a time.
-    fn pair(&self, base: &Model, screened: &Screened) -> Option<Model> {
-        let Screened { ranked, columns, rest, .. } = screened;
-        let mut least = 2.0 * ranked.first().map_or(0.0, |(gain, _)| *gain);
+    /// The two wanted causes of a screening that would lower χ² most together, if by more than `least`.
+    pub(super) fn pair(&self, base: &Model, screened: &Screened, least: f64, is_wanted: impl Fn(&Term) -> bool) -> Option<Model> {
+        let Screened { columns, rest, .. } = screened;
+        let is_law = |term: &Term| !self.candidate(term).is_free_form && !self.candidate(term).is_variant && is_wanted(term);
+        let columns: Vec<_> = columns.iter().filter(|(term, _)| is_law(term)).collect();
         let sizes: Vec<[f64; 2]> = columns.iter().map(|(_, u)| [u.norm_squared(), u.dot(rest)]).collect();
-        let mut pair = None;
+        let (mut least, mut pair) = (least, None);
         for (index, (first, u)) in columns.iter().enumerate() {
             for (other, (second, v)) in columns[..index].iter().enumerate() {
                 // Least squares of −rest on the two.
                 let ([uu, ur], [vv, vr], uv) = (sizes[index], sizes[other], u.dot(v));
                 let determinant = uu * vv - uv * uv;
-                let is_no_law = |term: &Term| self.candidate(term).is_free_form || self.candidate(term).is_variant;
-                if is_no_law(first) || is_no_law(second) {
-                    continue;
-                }
                 if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
                     continue;
                 }
@@ -492,12 +554,19 @@ impl Search<'_> {
         (Term { candidate: start.candidate, x: start.x.iter().zip(parameters).map(moved).collect() }, true)
     }
 
-    /// The best screened starts of `count` different candidates.
+    /// The best screened starts of `count` different candidates, at most [`FORMS`] of one cause.
     pub(super) fn finalists<'m>(&self, screened: impl IntoIterator<Item = &'m (f64, Model)>, count: usize) -> Vec<Model> {
-        first_of_each(screened, count, |term| term.candidate)
+        let mut chosen: Vec<Model> = Vec::new();
+        for model in first_of_each(screened, usize::MAX, |term| term.candidate) {
+            let id = |model: &Model| model.terms.last().map(|term| self.id(term.candidate));
+            if chosen.len() < count && chosen.iter().filter(|other| id(other) == id(&model)).count() < FORMS {
+                chosen.push(model);
+            }
+        }
+        chosen
     }
 
-    /// The best screened candidates fitted on top of `from`, best on held-out runs first, and the screening.
+    /// The best screened candidates fitted on top of `from`, best on select runs first, and the screening.
     ///
     /// # Errors
     /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
@@ -521,7 +590,7 @@ impl Search<'_> {
                 trials.push(Trial { candidate: term.candidate, scored });
             }
         }
-        // Possible winners are refitted: an unconverged fit may do better on held-out runs than a converged one.
+        // Possible winners are refitted: an unconverged fit may do better on select runs than a converged one.
         let best = |by: &dyn Fn(&Scored) -> f64, free: bool| {
             let of_kind = (0..trials.len()).filter(|k| self.ends_free(trials[*k].scored.model()) == free);
             of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
@@ -542,9 +611,9 @@ impl Search<'_> {
         Ok((trials, screened))
     }
 
-    /// The criterion of ranking: χ² of the held-out runs, or BIC where there are none.
+    /// The criterion of ranking: χ² of the select runs, or BIC where there are none.
     pub fn judged(&self, scored: &Scored) -> f64 {
-        if self.split.held.is_empty() { scored.bic() } else { scored.held }
+        if self.split.select.is_empty() { scored.bic() } else { scored.select }
     }
 
     /// Forward selection: adds causes while they are worth it. Returns the last model and the first round's trials.
@@ -555,7 +624,7 @@ impl Search<'_> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
         let mut causes = 0;
-        while causes < MOST_CAUSES && self.share_left(&best) > SOUGHT {
+        while causes < MOST_CAUSES && self.is_sought(&best) {
             causes += 1;
             let (trials, screened) = self.trials(&best)?;
             // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
@@ -637,6 +706,11 @@ impl Search<'_> {
         self.unexplained = (chi2 / self.estimator.count(runs).max(1) as f64 - 1.0).max(0.0);
     }
 
+    /// True if more is sought: a model leaves a visible share of what re-tuned constants leave, or more than half the noise.
+    fn is_sought(&self, scored: &Scored) -> bool {
+        self.share_left(scored) > SOUGHT || self.above(scored) > VISIBLE
+    }
+
     /// What a model leaves, as a share of what re-tuned constants leave.
     pub(super) fn share_left(&self, scored: &Scored) -> f64 {
         let (chi2, runs) = self.chi2_to_judge_by(scored);
@@ -644,9 +718,9 @@ impl Search<'_> {
         if self.unexplained > 0.0 { left / self.unexplained } else { 1.0 }
     }
 
-    /// χ² of the held-out runs, or of the fit runs where there are none.
+    /// χ² of the select runs, or of the fit runs where there are none.
     fn chi2_to_judge_by(&self, scored: &Scored) -> (f64, &[usize]) {
-        if self.split.held.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.held, &self.split.held) }
+        if self.split.select.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.select, &self.split.select) }
     }
 
     /// The adoption of a model's last term, in words.
@@ -659,7 +733,9 @@ impl Search<'_> {
 
     /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.
     fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
-        let pair = self.pair(base.model(), screened)?;
+        // Other pairs are found one cause at a time.
+        let least = 2.0 * screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let pair = self.pair(base.model(), screened, least, |_| true)?;
         if let [.., first, second] = &pair.terms[..] {
             (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
         }
@@ -669,10 +745,15 @@ impl Search<'_> {
 
     /// True if the fit runs need what `less` leaves out.
     fn is_seen_by_fit(&self, more: &Scored, less: &Scored) -> bool {
-        less.fitted - more.fitted > SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
+        less.fitted - more.fitted > self.least_seen()
     }
 
-    /// A cause that shows in fit runs only: the run that it improves most is held out as well, and the cause, fitted to the others, has to improve it
+    /// Least rise of χ² by which the fit runs need a cause.
+    fn least_seen(&self) -> f64 {
+        SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
+    }
+
+    /// A cause that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
     /// too. Keeps the new split if it does.
     fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
         let named = trials.iter().filter(|trial| !self.ends_free(trial.scored.model()));
@@ -683,8 +764,8 @@ impl Search<'_> {
         (self.progress)(&format!("{} on another split", self.id(trial.candidate)));
         let before = self.split.clone();
         self.split.fit.retain(|other| *other != run);
-        self.split.held.push(run);
-        self.split.held.sort_unstable();
+        self.split.select.push(run);
+        self.split.select.sort_unstable();
         if let (Ok(plain), Ok(with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
             && self.is_worth(&with, &plain)
         {
@@ -703,10 +784,8 @@ impl Search<'_> {
         let mut best = from;
         loop {
             let shorter = |index: usize| {
-                let mut model = best.model().clone();
-                let term = model.terms.remove(index);
-                (self.progress)(&format!("doing without {}", self.id(term.candidate)));
-                self.ranked(&model)
+                (self.progress)(&format!("doing without {}", self.id(best.model().terms[index].candidate)));
+                self.ranked(&self.without(&best, index)?)
             };
             // First those within the error of the discretisation.
             let plant = self.estimator.plant;
@@ -726,8 +805,43 @@ impl Search<'_> {
         }
     }
 
+    /// A model without term `index`, whose other coordinates make up for it as far as they can by the linear estimate, if that lowers χ².
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model without the term cannot be simulated.
+    pub(super) fn without(&self, best: &Scored, index: usize) -> Result<Model, DiagnoseError> {
+        let model = best.model();
+        let information = &best.fit.information;
+        let (own, others): (Vec<_>, Vec<_>) =
+            coordinates(model).into_iter().enumerate().partition(|(_, (term, _))| *term == index);
+        let mut plain = model.clone();
+        let removed = plain.terms.remove(index);
+        if others.is_empty() || information.nrows() != own.len() + others.len() {
+            return Ok(plain);
+        }
+        let parameters = &self.candidate(&removed).parameters;
+        let by = DVector::from_iterator(own.len(), removed.x.iter().zip(parameters).map(|(x, p)| p.off.unwrap_or(*x) - x));
+        let of = |rows: &[(usize, (usize, usize))], columns: &[(usize, (usize, usize))]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| information[(rows[i].0, columns[j].0)])
+        };
+        let mut among_others = of(&others, &others);
+        (0..others.len()).for_each(|k| among_others[(k, k)] *= 1.0 + LEAST_RIDGE);
+        let Some(shift) = among_others.lu().solve(&-(of(&others, &own) * by)) else { return Ok(plain) };
+        let mut moved = plain.clone();
+        for ((term, parameter), by) in coordinates(&plain).into_iter().zip(shift.iter()) {
+            let [low, high] = self.candidate(&plain.terms[term]).parameters[parameter].bounds;
+            let x = &mut moved.terms[term].x[parameter];
+            *x = (*x + by).clamp(low, high);
+        }
+        let chi2 = |model: &Model| -> Result<f64, DiagnoseError> {
+            Ok(self.estimator.residuals_of(model, &self.split.fit)?.iter().map(|r| sum_of_squares(r)).sum())
+        };
+        let of_plain = chi2(&plain)?;
+        Ok(if chi2(&moved).is_ok_and(|of_moved| of_moved < of_plain) { moved } else { plain })
+    }
+
     /// The [`LEAST_SIGNIFICANT`] terms by Wald's statistic dᵀ C⁻¹ d, with d the distances of a term's coordinates from their off values and C their
-    /// covariance.
+    /// covariance; without those that are [`CLEARLY`] seen in the fit runs.
     fn least_significant(&self, best: &Scored) -> Vec<usize> {
         let covariance = covariance(&best.fit.information);
         let mut first = 0;
@@ -742,6 +856,7 @@ impl Search<'_> {
             let wald = part.lu().solve(&d).map_or(0.0, |solved| d.dot(&solved));
             order.push((if wald.is_finite() { wald } else { 0.0 }, index));
         }
+        order.retain(|(wald, _)| *wald < CLEARLY * self.least_seen());
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         order.into_iter().take(LEAST_SIGNIFICANT).map(|(_, index)| index).collect()
     }
@@ -753,18 +868,17 @@ impl Search<'_> {
         if is_constant { self.is_significant(more, less) } else { self.is_worth(more, less) }
     }
 
-    /// Replaces every cause by other candidates, `most` of each: the index of the term, and the trial.
+    /// Replaces every cause by other candidates, `most` of each: the candidate that is removed, and the trial.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         for (index, removed) in best.model().terms.iter().enumerate() {
-            let mut model = best.model().clone();
-            model.terms.remove(index);
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
-            let Ok(without) = self.fitted_at_its_spread(&model) else { continue };
+            let without = self.without(best, index).and_then(|model| self.ranked_at_its_spread(&model));
+            let Ok(without) = without else { continue };
             let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?;
             let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
             let own = without.total() - best.total();
@@ -774,7 +888,7 @@ impl Search<'_> {
                 let Some(term) = model.terms.last() else { continue };
                 let candidate = term.candidate;
                 if let Ok(scored) = self.ranked_beyond(&model, &screened) {
-                    found.push((index, Trial { candidate, scored }));
+                    found.push((removed.candidate, Trial { candidate, scored }));
                 }
             }
         }
@@ -888,81 +1002,13 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Splits runs into fit and held-out ones; given roles are kept.
-///
-/// The others are split in the same way among runs with jumps of the input and among those without: in order of the input's speed, one of every
-/// three neighbours is held out, in turn the one with the largest and the one with the smallest range; the slowest and the fastest never are. Of two
-/// or three runs in all, the last or middle one is held out.
-pub fn split(plant: &dyn Plant, roles: &[Role]) -> Split {
-    let signals = plant.signals();
-    let (mut fit, mut held) = (Vec::new(), Vec::new());
-    let mut kinds: [Vec<Pace>; 2] = [Vec::new(), Vec::new()];
-    for (run, signal) in signals.iter().enumerate() {
-        match roles.get(run).copied().unwrap_or_default() {
-            Role::Fit => fit.push(run),
-            Role::HeldOut => held.push(run),
-            Role::Auto => {
-                let pace = Pace::of(run, signal);
-                kinds[usize::from(pace.jumps)].push(pace);
-            }
-        }
-    }
-    for mut order in kinds {
-        order.sort_by(|a, b| a.speed.total_cmp(&b.speed).then(a.range.total_cmp(&b.range)));
-        let count = order.len();
-        let inner = if count < 3 { 0..0 } else { 1..count - 1 };
-        let mut out = Vec::new();
-        for (index, group) in order[inner].chunks(3).enumerate() {
-            let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
-            out.extend(group.iter().max_by(|a, b| (sign * a.range).total_cmp(&(sign * b.range))).map(|pace| pace.run));
-        }
-        for pace in order {
-            if out.contains(&pace.run) { held.push(pace.run) } else { fit.push(pace.run) }
-        }
-    }
-    fit.sort_unstable();
-    held.sort_unstable();
-    if fit.is_empty() {
-        std::mem::swap(&mut fit, &mut held);
-    }
-    if held.is_empty() && fit.len() >= 2 && roles.iter().all(|role| *role == Role::Auto) {
-        held.extend(fit.pop());
-    }
-    Split { fit, held }
-}
-
-/// Speed and range of a run's input.
-struct Pace {
-    run: usize,
-    /// Path of the input over its range, per second.
-    speed: f64,
-    /// Largest less smallest input.
-    range: f64,
-    /// True if the input jumps between two rows.
-    jumps: bool,
-}
-
-impl Pace {
-    fn of(run: usize, signal: &Signal) -> Self {
-        let (low, high) =
-            signal.inputs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
-        let range = (high - low).max(1e-9);
-        let (mut path, mut time, mut largest) = (0.0, 0.0, 0.0_f64);
-        for (u, t) in signal.inputs.windows(2).zip(signal.times.windows(2)).filter(|(_, t)| t[1] > t[0]) {
-            path += (u[1] - u[0]).abs();
-            largest = largest.max((u[1] - u[0]).abs());
-            time += t[1] - t[0];
-        }
-        let rows = signal.inputs.len().max(1) as f64;
-        // A smooth input changes by π/2 times its mean change at most, a triangle by its mean.
-        let jumps = largest > 6.0 * path / rows && largest > 0.05 * range;
-        Self { run, speed: path / range / f64::max(time, 1e-9), range, jumps }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::dataset::Role;
+    use crate::diagnose::plant::{Plant, Signal};
+    use crate::diagnose::split::split;
+
     /// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
     struct Waves {
         signals: Vec<Signal>,

@@ -3,8 +3,9 @@
 use nalgebra::DVector;
 
 use super::DiagnoseError;
+use super::fit::sum_of_squares;
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_GAIN, Scored, Screened, Search, joined, without_directions};
+use super::search::{LEAST_GAIN, Scored, Screened, Search, Trial, joined, without_directions};
 
 /// Fewest runs that are resampled.
 const LEAST_RUNS: usize = 4;
@@ -17,25 +18,46 @@ const LEFT_BY_CONSTANT: f64 = 0.02;
 /// How firmly a cause stands.
 pub(super) struct Standing {
     /// Share of resamples in which it is chosen; none with few runs.
-    pub stability: Option<f64>,
+    pub(super) stability: Option<f64>,
+    /// Folds of the cross-validation without which it would not be worth it. Where a rival would be chosen, it stands for the rival.
+    pub(super) needs: Vec<usize>,
     /// True for a constant in the stead of which the free form of another cause's place would do as well, and beside which it still finds something: the
     /// constant may be what the law of that cause lacks.
-    pub is_left_by_law: bool,
+    pub(super) is_left_by_law: bool,
 }
 
-/// How firmly term `index` of `best` stands against the model `without` it. Linear in the change of the residuals, so no fit is needed.
+/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by linear estimates.
 ///
 /// # Errors
 /// [`DiagnoseError`] if the model cannot be simulated.
-pub(super) fn standing(search: &Search, best: &Scored, without: &Scored, index: usize) -> Result<Standing, DiagnoseError> {
+pub(super) fn standing(
+    search: &Search,
+    best: &Scored,
+    without: &Scored,
+    index: usize,
+    fitted: &[&Trial],
+) -> Result<(Standing, Screened), DiagnoseError> {
     // Free forms count in the stead of constants only.
     let is_constant = search.candidate(&best.model().terms[index]).is_constant;
     let screened =
         search.screen_of(without, |candidate| if candidate.is_free_form { is_constant } else { !candidate.is_variant })?;
-    Ok(Standing {
-        stability: stability(search, best, without, index, &screened),
-        is_left_by_law: is_constant && is_left_by_law(search, best, without, index, &screened)?,
-    })
+    let is_left_by_law = is_constant && is_left_by_law(search, best, without, index, &screened)?;
+    let runs = search.split.all();
+    if runs.len() < LEAST_RUNS {
+        return Ok((Standing { stability: None, needs: Vec::new(), is_left_by_law }, screened));
+    }
+    let contest = Contest::new(search, best, without, index, &screened, fitted);
+    let resamples: Vec<[usize; 2]> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).collect();
+    let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..])).count();
+    let places = |fold: &[usize]| -> Vec<usize> { (0..runs.len()).filter(|at| fold.contains(&runs[*at])).collect() };
+    let folds = search.split.folds();
+    let is_lost_without = |fold: &usize| !contest.shows(&places(&folds[*fold]));
+    let standing = Standing {
+        stability: Some(chosen as f64 / resamples.len() as f64),
+        needs: (0..folds.len()).filter(is_lost_without).collect(),
+        is_left_by_law,
+    };
+    Ok((standing, screened))
 }
 
 fn is_left_by_law(
@@ -60,39 +82,79 @@ fn is_left_by_law(
     Ok(most(screened) > TAKEN_BY_LAW * gain && most(&search.screen_of(best, is_law)?) > LEFT_BY_CONSTANT * gain)
 }
 
-/// Share of resamples, which leave out one or two of the runs, in which term `index` of `best` is chosen: in which it lowers χ² of the model `without` it by
-/// more than any other cause, and visibly.
-fn stability(search: &Search, best: &Scored, without: &Scored, index: usize, screened: &Screened) -> Option<f64> {
-    let runs = search.split.all();
-    if runs.len() < LEAST_RUNS {
-        return None;
+/// What a cause and its rivals take, run by run.
+struct Contest {
+    /// Number of values of each run.
+    counts: Vec<f64>,
+    /// Fall of χ² in each run by the cause, ...
+    own: Vec<f64>,
+    /// ... and the parts of its linear estimate.
+    own_parts: Vec<[f64; 2]>,
+    /// Fall of χ² in each run by each rival that was fitted.
+    fitted: Vec<Vec<f64>>,
+    /// Parts of the linear estimate of each other rival.
+    linear: Vec<Vec<[f64; 2]>>,
+}
+
+impl Contest {
+    fn new(search: &Search, best: &Scored, without: &Scored, index: usize, screened: &Screened, fitted: &[&Trial]) -> Self {
+        let runs = search.split.all();
+        let own = search.candidate(&best.model().terms[index]);
+        let is_rival = |candidate: usize| {
+            let other = &search.estimator.plant.candidates()[candidate];
+            other.id != own.id
+                && !(other.is_free_form || other.is_variant)
+                && !(own.is_free_form && other.places.iter().any(|place| own.places.contains(place)))
+        };
+        let falls = |scored: &Scored| -> Vec<f64> {
+            let of = |run: &usize| sum_of_squares(&without.residuals[*run]) - sum_of_squares(&scored.residuals[*run]);
+            runs.iter().map(of).collect()
+        };
+        let column = without_directions(&screened.tangents, &(joined(best, &runs) - joined(without, &runs)));
+        let lengths: Vec<usize> = runs.iter().map(|run| without.residuals[*run].len()).collect();
+        let of = |column: &DVector<f64>| parts(column, &screened.rest, &lengths);
+        let is_linear = |term: &Term, column: &DVector<f64>| {
+            is_rival(term.candidate)
+                && fitted.iter().all(|trial| trial.candidate != term.candidate)
+                && search.moved(term, -screened.rest.dot(column) / column.norm_squared()).1
+        };
+        Self {
+            counts: runs.iter().map(|run| search.estimator.count(&[*run]) as f64).collect(),
+            own: falls(best),
+            own_parts: of(&column),
+            fitted: fitted.iter().filter(|trial| is_rival(trial.candidate)).map(|trial| falls(&trial.scored)).collect(),
+            linear: screened
+                .columns
+                .iter()
+                .filter(|(term, column)| is_linear(term, column))
+                .map(|(_, column)| of(column))
+                .collect(),
+        }
     }
-    let own = search.candidate(&best.model().terms[index]);
-    let is_rival = |term: &Term| {
-        let other = search.candidate(term);
-        other.id != own.id
-            && !(other.is_free_form || other.is_variant)
-            && !(own.is_free_form && other.places.iter().any(|place| own.places.contains(place)))
-    };
-    let column = without_directions(&screened.tangents, &(joined(best, &runs) - joined(without, &runs)));
-    let lengths: Vec<usize> = runs.iter().map(|run| without.residuals[*run].len()).collect();
-    let own_parts = parts(&column, &screened.rest, &lengths);
-    let rivals: Vec<Vec<[f64; 2]>> = screened
-        .columns
-        .iter()
-        .filter(|(term, column)| is_rival(term) && search.moved(term, -screened.rest.dot(column) / column.norm_squared()).1)
-        .map(|(_, column)| parts(column, &screened.rest, &lengths))
-        .collect();
-    let counts: Vec<f64> = runs.iter().map(|run| search.estimator.count(&[*run]) as f64).collect();
-    let is_chosen = |left_out: &[usize]| {
-        let weights: Vec<f64> = (0..runs.len()).map(|run| if left_out.contains(&run) { 0.0 } else { 1.0 }).collect();
-        let count: f64 = weights.iter().zip(&counts).map(|(weight, count)| weight * count).sum();
-        let gain = fall(&own_parts, &weights);
-        gain > LEAST_GAIN * count && rivals.iter().all(|rival| fall(rival, &weights) < gain)
-    };
-    let resamples: Vec<bool> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).map(|pair| is_chosen(&pair)).collect();
-    let chosen = resamples.iter().filter(|is_chosen| **is_chosen).count();
-    Some(chosen as f64 / resamples.len() as f64)
+
+    /// Weights of the runs without those `left_out` (by their places in the list of runs).
+    fn weights(&self, left_out: &[usize]) -> Vec<f64> {
+        (0..self.counts.len()).map(|run| if left_out.contains(&run) { 0.0 } else { 1.0 }).collect()
+    }
+
+    /// True if the cause lowers χ² visibly without the runs `left_out`.
+    fn shows(&self, left_out: &[usize]) -> bool {
+        let weights = self.weights(left_out);
+        weighted(&self.own, &weights).max(fall(&self.own_parts, &weights)) > LEAST_GAIN * weighted(&self.counts, &weights)
+    }
+
+    /// True if the cause lowers χ² most of all without the runs `left_out`, and visibly.
+    fn chooses(&self, left_out: &[usize]) -> bool {
+        let weights = self.weights(left_out);
+        let (own, linear) = (weighted(&self.own, &weights), fall(&self.own_parts, &weights));
+        self.shows(left_out)
+            && self.fitted.iter().all(|falls| weighted(falls, &weights) < own)
+            && self.linear.iter().all(|parts| fall(parts, &weights) < linear)
+    }
+}
+
+fn weighted(values: &[f64], weights: &[f64]) -> f64 {
+    values.iter().zip(weights).map(|(value, weight)| weight * value).sum()
 }
 
 /// Per run the inner products of a column with the residuals and with itself.

@@ -1,7 +1,7 @@
 //! The verdict of a diagnosis in a sentence.
 
 use super::combinations::Combination;
-use super::diagnosis::{Adopted, Part, Verdict};
+use super::diagnosis::{Adopted, JudgedBy, Part, Verdict};
 use super::names;
 use super::residual_tests::ResidualTest;
 
@@ -69,11 +69,24 @@ pub(super) struct Findings<'a> {
     pub(super) refined: bool,
     /// The result of [`failing`] for the extended model.
     pub(super) failing: Option<&'a str>,
+    /// What judges the models.
+    pub(super) judged_by: JudgedBy,
+    /// Number of runs.
+    pub(super) runs: usize,
+}
+
+/// The sentence, with how gains are known where there are too few runs to keep some for judging; one that says that the data are insufficient says it.
+fn with_few_runs(main: String, findings: &Findings) -> String {
+    if findings.judged_by == JudgedBy::JudgeRuns || findings.insufficient.is_some() {
+        return main;
+    }
+    let judged = "are too few to keep some for judging alone: gains are by nested cross-validation";
+    format!("{} ({} runs {judged}).", main.strip_suffix('.').unwrap_or(&main), findings.runs)
 }
 
 /// The verdict in a sentence.
 pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
-    let Findings { effects, combinations, place_in_words, left, has_rest, insufficient, resolution, refined, failing } =
+    let Findings { effects, combinations, place_in_words, left, has_rest, insufficient, resolution, refined, failing, .. } =
         *findings;
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
@@ -126,6 +139,7 @@ pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
             ),
         },
     };
+    let main = with_few_runs(main, findings);
     if minor.is_empty() {
         return main;
     }
@@ -147,6 +161,8 @@ mod tests {
         resolution: 3.0,
         refined: false,
         failing: None,
+        judged_by: JudgedBy::JudgeRuns,
+        runs: 11,
     };
 
     fn tests(count: usize, failed: usize) -> Vec<ResidualTest> {

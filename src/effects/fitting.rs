@@ -34,6 +34,8 @@ pub enum Place {
     GainAlong,
     /// Force against the sheet's speed.
     Air,
+    /// A tape or cable at the robot.
+    Attachment,
     /// Friction against slip speed.
     FloorFriction,
     /// Impacts on the floor.
@@ -46,7 +48,7 @@ pub enum Place {
 
 impl Place {
     /// All places.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Discretisation,
         Self::Mass,
         Self::Stiffness,
@@ -60,32 +62,34 @@ impl Place {
         Self::Drive,
         Self::GainAlong,
         Self::Air,
+        Self::Attachment,
         Self::FloorFriction,
         Self::Impact,
         Self::Floor,
         Self::Picture,
     ];
 
-    /// Its name in files.
+    /// Its name in files: where, and what of it.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Discretisation => "discretisation",
-            Self::Mass => "mass",
-            Self::Stiffness => "stiffness",
-            Self::Clamp => "clamp",
-            Self::RestShape => "rest-shape",
-            Self::JointMomentOfDeviation => "joint-moment-of-deviation",
-            Self::JointMomentOfRate => "joint-moment-of-rate",
-            Self::JointMemory => "joint-memory",
-            Self::VoltageCurve => "voltage-curve",
-            Self::VoltageMemory => "voltage-memory",
-            Self::Drive => "drive",
-            Self::GainAlong => "gain-along",
-            Self::Air => "air",
-            Self::FloorFriction => "floor-friction",
-            Self::Impact => "impact",
-            Self::Floor => "floor",
-            Self::Picture => "picture",
+            Self::Discretisation => "numerics/discretisation",
+            Self::Mass => "structure/mass",
+            Self::Stiffness => "structure/stiffness",
+            Self::Clamp => "mounting/clamp",
+            Self::RestShape => "structure/rest-shape",
+            Self::JointMomentOfDeviation => "joint/moment-of-deviation",
+            Self::JointMomentOfRate => "joint/moment-of-rate",
+            Self::JointMemory => "joint/memory",
+            Self::VoltageCurve => "actuation/curve-of-voltage",
+            Self::VoltageMemory => "actuation/memory-of-voltage",
+            Self::Drive => "driver/response",
+            Self::GainAlong => "actuation/gain-along",
+            Self::Air => "air/drag",
+            Self::Attachment => "mounting/attachment",
+            Self::FloorFriction => "ground/friction",
+            Self::Impact => "ground/impact",
+            Self::Floor => "ground/shape",
+            Self::Picture => "measurement/picture",
         }
     }
 
@@ -105,6 +109,7 @@ impl Place {
             Self::Drive => "the driver’s response to its command",
             Self::GainAlong => "the gain along the robot",
             Self::Air => "the force of the air on the sheet",
+            Self::Attachment => "a tape or cable at the robot",
             Self::FloorFriction => "friction on the floor",
             Self::Impact => "impacts on the floor",
             Self::Floor => "the floor’s slope",
@@ -124,16 +129,19 @@ pub struct Bench {
     pub actuators: usize,
     /// Number of markers.
     pub markers: usize,
+    /// Number of measured runs.
+    pub runs: usize,
 }
 
 impl Bench {
-    /// A robot with a number of `markers`.
-    pub fn new(robot: &Robot, markers: usize) -> Self {
+    /// A robot with a number of `markers` that was measured in a number of `runs`.
+    pub fn new(robot: &Robot, markers: usize, runs: usize) -> Self {
         Self {
             is_clamped: robot.mount == Mount::Clamped,
             is_on_floor: robot.mount == Mount::Ground,
             actuators: robot.actuators,
             markers,
+            runs,
         }
     }
 }
@@ -202,6 +210,11 @@ pub mod fits {
     /// With several actuators: one alone cannot tell the effect from the gain of all.
     pub fn several_actuators(bench: &Bench) -> bool {
         bench.actuators > 1
+    }
+
+    /// With more than two runs: any two differ by a drift.
+    pub fn several_runs(bench: &Bench) -> bool {
+        bench.runs > 2
     }
 
     /// With a visible shape: the tip alone cannot tell the effect from the gain.

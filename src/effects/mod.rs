@@ -94,6 +94,12 @@ impl Parameter {
     const fn scale(bounds: [f64; 2], about: &'static str) -> Self {
         Self { name: "scale", unit: "", bounds, off: Some(1.0), default: None, about }
     }
+
+    /// The place of a run in the order of measurement, which a diagnosis sets ([`Applied::in_run`]).
+    const fn run() -> Self {
+        let about = "place n of the run from the mean of all";
+        Self { name: "run", unit: "", bounds: [-1e6, 1e6], off: None, default: Some(0.0), about }
+    }
 }
 
 /// How an effect acts. All functions take the parameters in the order of [`Effect::parameters`], in their units.
@@ -143,14 +149,17 @@ pub static EFFECTS: &[&Effect] = &[
     &calibration::DAMPING,
     &calibration::AREAL_MASS,
     &numerics::DISCRETISATION,
+    &structure::STIFFNESS_DRIFT,
     &structure::CLAMP_COMPLIANCE,
     &structure::FREE_CLAMP,
+    &structure::CLAMP_SHIFT,
     &structure::TIP_MASS,
     &structure::INITIAL_CURVATURE,
     &structure::STIFFNESS_SOFTENING,
     &structure::DRY_FRICTION,
     &structure::STRUCTURAL_DAMPING,
     &structure::AIR_DRAG,
+    &structure::CABLE_DRAG,
     &structure::FREE_MOMENT_OF_DEVIATION,
     &structure::FREE_MOMENT_OF_RATE,
     &structure::FREE_JOINT_MEMORY,
@@ -163,6 +172,9 @@ pub static EFFECTS: &[&Effect] = &[
     &driver::SLEW_LIMIT,
     &driver::DRIVER_LAG,
     &driver::FREE_DRIVE_FILTER,
+    &actuation::GAIN_DRIFT,
+    &actuation::REMANENCE,
+    &actuation::WAKE_UP,
     &actuation::HYSTERESIS,
     &actuation::CREEP,
     &actuation::FREE_VOLTAGE_PLAYS,
@@ -342,6 +354,15 @@ impl Applied {
         self.values.get(index).copied()
     }
 
+    /// The effect in the run with the place `run` in the order of measurement, from the mean of all; unchanged if it is the same in all runs.
+    #[must_use]
+    pub fn in_run(mut self, run: f64) -> Self {
+        if let Some(index) = self.effect.parameters.iter().position(|p| p.name == "run") {
+            self.values[index] = run;
+        }
+        self
+    }
+
     fn check(&self, robot: &Robot) -> Result<(), EffectError> {
         let wrong = |message: String| Err(EffectError::Robot { id: self.effect.id, message });
         if let Some(actuator) = self.get("actuator")
@@ -360,9 +381,18 @@ impl Applied {
         {
             return wrong(format!("motors_per_actuator is {}, but must be a whole number", number(m)));
         }
+        if let (Some(per_run), Some(run)) = (self.get("per_run"), self.get("run"))
+            && 1.0 + per_run * run < LEAST_DRIFTED
+        {
+            let factor = number(1.0 + per_run * run);
+            return wrong(format!("the factor in run {} is {factor}, but must be at least {LEAST_DRIFTED}", number(run)));
+        }
         Ok(())
     }
 }
+
+/// Least factor to which a constant may drift (–).
+const LEAST_DRIFTED: f64 = 0.1;
 
 /// Applies effects to a robot and its drive.
 ///

@@ -4,21 +4,23 @@
 //!
 //! Without extensions the robot is the reference's, and none of this is computed. With them:
 //!
-//! - Joint torques ([`JointExtensions`]), drag in air ([`Air`]) and friction that depends on speed ([`Sliding`]) act like the torque law: with
+//! - Joint torques ([`JointExtensions`]), drag in air ([`Air`]), tapes and cables ([`Attachments`]) and friction that depends on speed ([`Sliding`]) act like the torque law: with
 //!   the state at the step's start, an error of first order in the step. Only the Prony chains have a memory; it is part of saved states.
 //! - A point mass changes mass, centre of mass and inertia of the body it is fixed to, exactly. Records stay those of the boxes.
 //! - A compliant clamp is a spring at the left end, in the constraint that holds the base. It is implicit, so any compliance is stable at any step; its
-//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step. One whose turn is a curve of the moment
-//!   is linearised there at the step's start, a further error of first order.
+//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step. So is a clamp that shifts. A clamp whose turn
+//!   is a curve of the moment is linearised there at the step's start, a further error of first order.
 //! - Restitution is Bullet's, with its threshold of 0.2 cm/s, without the push-out of the overlap that Bullet adds. The approach speed includes what the
 //!   step's forces add, so a foot that the actuators press down by more than 0.2 cm/s per step trembles; the planar engine takes the speed at the step's start.
 
 mod air;
+mod attachment;
 mod geometry;
 mod joint_extensions;
 mod sliding;
 
 use self::air::Air;
+use self::attachment::Attachments;
 use self::geometry::{add, base_pitch, boxes, cross, pitch, rotation};
 use self::joint_extensions::JointExtensions;
 use self::sliding::Sliding;
@@ -54,8 +56,9 @@ pub struct BulletEngine {
     touching: Vec<bullet::Contact>,
     extensions: Option<JointExtensions>,
     air: Option<Air>,
+    attachments: Option<Attachments>,
     sliding: Option<Sliding>,
-    /// Motions of the boxes and wrenches on them, for drag and sliding friction.
+    /// Motions of the boxes and wrenches on them, for what acts from outside.
     boxes: Vec<LinkState>,
     wrenches: Vec<Wrench>,
     /// From each body's centre of mass to its box's centre, along the body (cm); empty if they are the same.
@@ -120,6 +123,9 @@ impl BulletEngine {
             }
             (Mount::Free, _) => {}
         }
+        if robot.mount == Mount::Clamped && extensions.clamp_shift > 0.0 {
+            world.set_constraint_shift(body, extensions.clamp_shift, extensions.clamp_shift_damping)?;
+        }
         let joints = robot.joints();
         let zeros = || vec![0.0; joints];
         Ok(Self {
@@ -136,6 +142,7 @@ impl BulletEngine {
             touching: Vec::new(),
             extensions: JointExtensions::new(robot),
             air: Air::new(robot),
+            attachments: Attachments::new(robot, time_step),
             sliding,
             boxes: Vec::with_capacity(bodies.len()),
             wrenches: vec![Wrench::default(); bodies.len()],
@@ -201,9 +208,9 @@ impl BulletEngine {
         p
     }
 
-    /// Sets drag, viscous friction and the coefficients of friction of the coming step.
+    /// Sets drag, the forces of what is fixed to the sheet, viscous friction and the coefficients of friction of the coming step.
     fn apply_surroundings(&mut self) -> Result<(), EngineError> {
-        if self.air.is_none() && self.sliding.is_none() {
+        if self.air.is_none() && self.attachments.is_none() && self.sliding.is_none() {
             return Ok(());
         }
         let base = self.base_state()?;
@@ -219,6 +226,9 @@ impl BulletEngine {
         self.wrenches.fill(Wrench::default());
         if let Some(air) = &self.air {
             air.push(&self.boxes, &mut self.wrenches);
+        }
+        if let Some(attachments) = &self.attachments {
+            attachments.push(&self.boxes, &mut self.wrenches);
         }
         if let Some(sliding) = &mut self.sliding {
             sliding.push(&self.boxes, &mut self.wrenches);

@@ -153,7 +153,8 @@ pub(super) const RUN: Section = Section {
             "role",
             Word(&["auto", "fit", "held-out"]),
             Is("\"auto\""),
-            "fit: parameters are fitted to it; held-out: models are judged by it; auto: the program decides",
+            "fit: parameters are fitted to it; held-out: causes are selected on it, or, of several every other one, the result is judged by it; auto: the \
+             program decides",
         ),
         key(
             "start",

@@ -25,6 +25,10 @@ pub struct Extensions {
     pub clamp_hardening: f64,
     /// Turn of a clamped root as a curve of the moment, in series with the compliance. Not beside a hardening.
     pub clamp_curve: ClampCurve,
+    /// Shift in z of a clamped left end per force on it (cm/dyn).
+    pub clamp_shift: f64,
+    /// Damping of that shift over its stiffness (s).
+    pub clamp_shift_damping: f64,
     /// Masses fixed to the sheet.
     pub point_masses: Vec<PointMass>,
     /// Curvature at 0 V (1/cm), one per actuator, or none.
@@ -51,6 +55,8 @@ pub struct Extensions {
     pub drag: [f64; DRAG_POWERS.len()],
     /// Another part of the drag coefficient at [`DRAG_SPEED`] (–), with any power of the speed.
     pub drag_of_power: [f64; 2],
+    /// Tapes and cables at the sheet.
+    pub attachments: Vec<Attachment>,
     /// Slope of the floor (rad), positive if it rises along +x.
     pub slope: f64,
     /// Share of the approach speed that contact returns (–).
@@ -77,6 +83,50 @@ pub struct PointMass {
     pub mass: f64,
     /// Distance from the left end along the sheet (cm).
     pub position: f64,
+}
+
+/// A tape or cable from a fixed point to a point of the sheet's centre line, taut on one side of a height: a spring with a damper and dry friction.
+///
+/// ```text
+/// F_z = −side·k·g − e·(k·T·ż + f·tanh(ż/v₀)),  g = max(0, side·(z − level)),  e = min(1, g/g₀)
+/// ```
+///
+/// with v₀ = [`ATTACHMENT_RATE`] and g₀ = `ENGAGEMENT`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attachment {
+    /// Distance from the left end along the sheet (cm).
+    pub position: f64,
+    /// Height from which on it is taut (cm).
+    pub level: f64,
+    /// 1 if it is taut above the level, −1 if below.
+    pub side: f64,
+    /// Stiffness k (dyn/cm).
+    pub stiffness: f64,
+    /// Damping over stiffness T (s).
+    pub damping: f64,
+    /// Force f of friction (dyn).
+    pub friction: f64,
+}
+
+impl Attachment {
+    /// How far a point at the height `z` (cm) is beyond the level (cm): g.
+    fn stretch(&self, z: f64) -> f64 {
+        (self.side * (z - self.level)).max(0.0)
+    }
+
+    /// Vertical force of the spring on a point at the height `z` (cm), and its stiffness there (dyn, dyn/cm).
+    pub fn spring(&self, z: f64) -> [f64; 2] {
+        let stretch = self.stretch(z);
+        [-self.side * self.stiffness * stretch, if stretch > 0.0 { self.stiffness } else { 0.0 }]
+    }
+
+    /// Force of damper and friction against the vertical velocity `v` (cm/s) of a point at the height `z` (cm), and its derivative (dyn, dyn·s/cm).
+    pub fn resistance(&self, z: f64, v: f64) -> [f64; 2] {
+        let engaged = (self.stretch(z) / ENGAGEMENT).min(1.0);
+        let (damper, share) = (self.stiffness * self.damping, (v / ATTACHMENT_RATE).tanh());
+        let slope = damper + self.friction / ATTACHMENT_RATE * (1.0 - share * share);
+        [engaged * (damper * v + self.friction * share), engaged * slope]
+    }
 }
 
 /// Friction that falls from its static to its sliding value: `μ (1 + (ratio − 1) exp(−(v/speed)²))`, and a viscous force beside it.
@@ -112,6 +162,8 @@ impl Default for Extensions {
             clamp_damping: 0.0,
             clamp_hardening: 0.0,
             clamp_curve: ClampCurve::RIGID,
+            clamp_shift: 0.0,
+            clamp_shift_damping: 0.0,
             point_masses: Vec::new(),
             rest_curvature: Vec::new(),
             joint_gains: Vec::new(),
@@ -125,6 +177,7 @@ impl Default for Extensions {
             loss: [0.0; LOSS_TIMES.len()],
             drag: [0.0; DRAG_POWERS.len()],
             drag_of_power: [0.0, 2.0],
+            attachments: Vec::new(),
             slope: 0.0,
             restitution: 0.0,
             stick_slip: StickSlip::OFF,
@@ -135,6 +188,10 @@ impl Default for Extensions {
 
 /// Rate at which dry friction has 76 % of its moment (rad/s): `τ_c tanh(θ̇/ω)`.
 pub const DRY_FRICTION_RATE: f64 = 0.03;
+/// Speed at which the friction of an attachment has 76 % of its force (cm/s).
+pub const ATTACHMENT_RATE: f64 = 0.1;
+/// Stretch with which damper and friction of an attachment have set in (cm).
+const ENGAGEMENT: f64 = 0.01;
 /// Curvature at which softening of any power is that of the cubic law (1/cm).
 pub const SOFTENING_CURVATURE: f64 = 0.02;
 /// Softening leaves at least this share of a joint's stiffness.

@@ -23,8 +23,8 @@ pub mod units;
 pub use clamp::{CLAMP_POINTS, ClampCurve};
 pub use curve::{CURVE_POINTS, Curve};
 pub use extensions::{
-    AIR_DENSITY, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES, PointMass, Slip, StickSlip,
-    VISCOUS_REACH,
+    AIR_DENSITY, ATTACHMENT_RATE, Attachment, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS,
+    LOSS_TIMES, PointMass, Slip, StickSlip, VISCOUS_REACH,
 };
 pub use friction::{FRICTION_POINTS, FrictionCurve};
 pub use laminate::{Laminate, Material};

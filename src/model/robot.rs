@@ -226,6 +226,17 @@ impl Robot {
         bodies
     }
 
+    /// The body on which a point stands that lies `position` (cm) along the sheet, and where between its left end (0) and its right end (1).
+    pub fn body_at(&self, position: f64) -> (usize, f64) {
+        let segments = self.segments();
+        let (mut body, mut left) = (0, 0.0);
+        while body + 1 < segments.len() && position >= left + segments[body].length {
+            left += segments[body].length;
+            body += 1;
+        }
+        (body, ((position - left) / segments[body].length).clamp(0.0, 1.0))
+    }
+
     /// Number of bodies that one film covers: `ceil(m·fraction + 0.5)`, as the reference counts.
     fn film_segments(&self) -> usize {
         (self.motors_per_actuator as f64 * self.friction.film_fraction + 0.5).ceil() as usize
@@ -330,6 +341,17 @@ mod tests {
         // Sums of 16 rounded terms: a few units in the last place.
         assert!((segments.iter().map(|s| s.length).sum::<f64>() - 50.0).abs() < 1e-13);
         assert!((segments.iter().map(|s| s.mass).sum::<f64>() / laminate.actuator_mass - 5.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn points_along_the_sheet_stand_on_their_bodies() {
+        // Bodies from 0 to 1.25, 3.75, 6.25, 8.75 and 10 cm.
+        let robot = robot(1, 4, Film::None);
+        for (position, body, share) in
+            [(0.0, 0, 0.0), (1.25, 1, 0.0), (5.0, 2, 0.5), (9.375, 4, 0.5), (10.0, 4, 1.0), (99.0, 4, 1.0)]
+        {
+            assert_eq!(robot.body_at(position), (body, share), "{position}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! friction follows an arc tangent, drag is a quadrature along each rod, a saturating amplifier has a rounded knee, and the gain
 //! that grows with the field is smooth at zero. What they share is the physics: a wrong sign or factor shows as a misfit.
 //!
-//! `OUTSIDE` are effects that no entry of the program's library describes. forms.rs has three other equations for twelve of the effects, bench.rs
+//! `OUTSIDE` are effects whose equations no entry of the program's library has; some have a namesake there. forms.rs has three other equations for twelve of the effects, bench.rs
 //! faults of a bench that come on top of anything, cases.rs the ids of all that can be hidden.
 
 #![allow(dead_code)] // every test uses a part of it
@@ -103,7 +103,7 @@ pub const INSIDE: &[&str] = &[
 /// An effect that is a fault of the bench: a gain that differs from run to run.
 pub const DRIFTING_GAIN: &str = "drifting-gain";
 
-/// Effects that the library does not have.
+/// Effects that the library does not have with these equations.
 pub const OUTSIDE: &[&str] = &["marker-slip", "cable-drag", "resonant-fixture", "mains-hum", "remanence"];
 
 /// Arc lengths of the markers mid and tip, cm.

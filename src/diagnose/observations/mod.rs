@@ -13,7 +13,7 @@ pub use page::page;
 use super::DiagnoseError;
 use super::candidates::candidates;
 use super::dataset::{Dataset, Observation};
-use super::diagnosis::{Adopted, Diagnosis, Estimate, Part, Ranked, RunError, Stage, Verdict};
+use super::diagnosis::{Adopted, BenchFound, Diagnosis, Estimate, Part, Ranked, RunError, Stage, Verdict};
 use super::fit::{Convergence, Estimator, Fit};
 use super::names;
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
@@ -127,7 +127,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
     let plant = Numbers {
         dataset,
         signals: signals.collect(),
-        candidates: candidates(&Bench::new(&dataset.robot, 1), &Visited::NOTHING),
+        candidates: candidates(&Bench::new(&dataset.robot, 1, 1), &Visited::NOTHING),
     };
     let runs: Vec<usize> = (0..plant.signals.len()).collect();
     let estimator = Estimator::new(&plant);
@@ -280,8 +280,8 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         unexplained: Vec::new(),
         noise_mm: 0.0,
         noise_correlated: 0.0,
-        noise_correlation_time_s: 0.0,
-        bench: Vec::new(),
+        judged_by: None,
+        bench: BenchFound::default(),
         baseline: stage(&nominal)?,
         calibrated: stage(best)?,
         extended: stage(best)?,

@@ -45,6 +45,7 @@
 //! Eng. 39 (1996) (time stepping with complementarity). M. Anitescu, Math. Program. 105 (2006) (the convex model). A. Castro et al., arXiv
 //! 2110.10107 (regularised cones and Newton's method).
 
+mod attachment;
 mod contact;
 mod floor;
 mod interface;
@@ -67,6 +68,7 @@ use std::cmp::Ordering;
 use fearless_simd::Level;
 use wide::f64x2;
 
+use self::attachment::Attachments;
 use self::floor::{Floor, Surface};
 use self::joint_extensions::JointExtensions;
 use self::lanes::Lanes;
@@ -74,7 +76,7 @@ use self::law::ContactLaw;
 pub use self::law::FrictionModel;
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::quad::Quad;
-use self::recursion::{BLOCK, BaseJoint, Distal};
+use self::recursion::{BLOCK, BaseJoint, Clamp, Distal, Slide, Turn};
 use self::step::{set_implicit, weight_of};
 use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, LARGEST_FRICTION, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -97,6 +99,7 @@ pub struct PlanarEngine {
     rest_angles: Vec<f64>,
     gains: Vec<f64>,
     extensions: Option<JointExtensions>,
+    attachments: Option<Attachments>,
     time_step: f64,
     gravity: f64,
     /// Acceleration by gravity along x and z (cm/s²).
@@ -178,7 +181,7 @@ impl PlanarEngine {
         let blocks = if robot.mount == Mount::Ground && levels > LONGEST_WHOLE { levels.div_ceil(BLOCK) } else { 0 };
         let (mut quads, frictions) = bodies_in_quads(robot, &segments, &bodies, root, levels);
         let mut base_joint = base_joint(robot);
-        if let BaseJoint::Hinged { .. } = base_joint {
+        if let Some(Turn::Hinged { .. }) = base_joint.turn() {
             quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
         set_implicit(&mut quads, &joint, &mut base_joint, weight, time_step);
@@ -194,6 +197,7 @@ impl PlanarEngine {
             rest_angles,
             gains: extensions.joint_gains.clone(),
             extensions: JointExtensions::new(extensions, robot.material.width, robot.link_length(), time_step, &quads),
+            attachments: Attachments::new(robot, root),
             time_step,
             gravity: robot.material.gravity,
             gravity_vector: gravity_vector(robot.material.gravity, extensions.slope),
@@ -258,6 +262,15 @@ impl PlanarEngine {
         self.mount == Mount::Clamped
     }
 
+    /// Velocity in z of a clamped root's reference point (cm/s): none unless the clamp gives.
+    fn slide_velocity(&self) -> f64 {
+        if !self.base_joint.slides() {
+            return 0.0;
+        }
+        let root = &self.quads[0];
+        root.motion[2].lane(0) - root.motion[0].lane(0) * root.half[0].lane(0)
+    }
+
     /// One number of body `i`.
     fn of_body(&self, i: usize, what: impl Fn(&Quad) -> Lanes) -> f64 {
         let (quad, lane) = place(i, self.root);
@@ -265,16 +278,25 @@ impl PlanarEngine {
     }
 }
 
-/// How the root of `robot` is joined to the world; a curve's times are set with the length of the step.
+/// How the root of `robot` is joined to the world; what depends on the length of the step is set with it.
 fn base_joint(robot: &Robot) -> BaseJoint {
+    if robot.mount != Mount::Clamped {
+        return BaseJoint::Free;
+    }
     let extensions = &robot.extensions;
     let damping_time = extensions.clamp_damping;
-    match (robot.mount, extensions.curved_clamp()) {
-        (Mount::Clamped, Some(curve)) => BaseJoint::Curved { curve, damping_time, ahead: 0.0, share: 0.0 },
-        (Mount::Clamped, None) if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged { damping_time },
-        (Mount::Clamped, None) => BaseJoint::Clamped,
-        _ => BaseJoint::Free,
-    }
+    let turn = match extensions.curved_clamp() {
+        Some(curve) => Turn::Curved { curve, damping_time, ahead: 0.0, share: 0.0 },
+        None if extensions.clamp_compliance > 0.0 => Turn::Hinged { damping_time },
+        None => Turn::Rigid,
+    };
+    let slide = (extensions.clamp_shift > 0.0).then(|| Slide {
+        stiffness: 1.0 / extensions.clamp_shift,
+        damping_time: extensions.clamp_shift_damping,
+        implicit: 0.0,
+        impulse: 0.0,
+    });
+    BaseJoint::Clamped(Clamp { turn, slide })
 }
 
 /// The bodies of `robot` in quads, and the coefficients of friction of each tree level's bodies.

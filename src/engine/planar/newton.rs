@@ -7,8 +7,8 @@ use fearless_simd::{Simd, prelude::*};
 use super::lanes::{Four, Lanes, Two, fma, inner};
 use super::law::{ContactLaw, FrictionModel};
 use super::path::Start;
-use super::quad::Motions;
-use super::recursion::{Articulated, BLOCK, solve};
+use super::quad::{Motions, Quad};
+use super::recursion::{Articulated, BLOCK, BaseJoint, ContactTerms, Distal, solve};
 use super::{EngineError, PlanarEngine};
 use crate::model::Mount;
 
@@ -52,6 +52,23 @@ enum Search {
     Whole,
     /// It is in between.
     Part,
+}
+
+/// [`solve`] with tapes or cables at the sheet. Out of line, for few robots have them.
+#[inline(never)]
+fn solve_attached(
+    skew: bool,
+    quads: &mut [Quad],
+    levels: Range<usize>,
+    base_joint: &BaseJoint,
+    contact: impl ContactTerms,
+    distal: &mut [Distal],
+) -> Articulated {
+    if skew {
+        solve::<true>(quads, levels, base_joint, contact, distal)
+    } else {
+        solve::<false>(quads, levels, base_joint, contact, distal)
+    }
 }
 
 impl PlanarEngine {
@@ -160,10 +177,14 @@ impl PlanarEngine {
         // Distal articulated inertias stored from other solves may be unsymmetric, so parts are always solved as such under Coulomb's law.
         let skew = law.friction == FrictionModel::Coulomb && (!self.distal.is_empty() || self.floor.slides());
         let floor = self.floor.tip_to_base(among, law);
+        if let Some(attachments) = &self.attachments {
+            let contact = attachments.with(floor);
+            return solve_attached(skew, &mut self.quads, levels.clone(), &self.base_joint, contact, &mut self.distal);
+        }
         if skew {
-            solve::<true>(&mut self.quads, levels.clone(), self.base_joint, floor, &mut self.distal)
+            solve::<true>(&mut self.quads, levels.clone(), &self.base_joint, floor, &mut self.distal)
         } else {
-            solve::<false>(&mut self.quads, levels.clone(), self.base_joint, floor, &mut self.distal)
+            solve::<false>(&mut self.quads, levels.clone(), &self.base_joint, floor, &mut self.distal)
         }
     }
 

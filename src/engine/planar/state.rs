@@ -1,5 +1,6 @@
 //! States as numbers: saved ones, which outlive the engine, and checkpoints of a run with adaptive steps.
 
+use super::attachment::Attachments;
 use super::joint_extensions::JointExtensions;
 use super::lanes::Lanes;
 use super::quad::Quad;
@@ -16,7 +17,7 @@ impl PlanarEngine {
         into.extend(self.centre.iter().chain(&self.velocity).chain(&self.work_sums));
         into.extend([self.numerical_loss, self.step as f64]);
         into.extend(self.floor.saved());
-        into.extend(self.extensions.iter().flat_map(JointExtensions::saved));
+        into.extend(self.saved_extensions());
     }
 
     pub(super) fn read_checkpoint(&mut self, checkpoint: &[f64]) -> Result<(), EngineError> {
@@ -30,17 +31,31 @@ impl PlanarEngine {
         let [x, z, vx, vz, volts, squares, loss, step, ref rest @ ..] = *rest else { return Err(EngineError::State) };
         let (corners, memory) = rest.split_at(self.floor.saved().count());
         self.floor.restore(corners);
+        self.restore_extensions(memory);
         self.step = step as u64;
         (self.centre, self.velocity, self.work_sums, self.numerical_loss) = ([x, z], [vx, vz], [volts, squares], loss);
-        if let Some(extensions) = &mut self.extensions {
-            extensions.restore(memory);
-        }
         self.finite = true;
         Ok(())
     }
 
+    /// Memory of joint extensions, then of what is fixed to the sheet.
+    fn saved_extensions(&self) -> impl Iterator<Item = f64> + '_ {
+        let joints = self.extensions.iter().flat_map(JointExtensions::saved);
+        joints.chain(self.attachments.iter().flat_map(Attachments::saved))
+    }
+
+    fn restore_extensions(&mut self, memory: &[f64]) {
+        let (joints, points) = memory.split_at(self.extensions.iter().flat_map(JointExtensions::saved).count());
+        if let Some(extensions) = &mut self.extensions {
+            extensions.restore(joints);
+        }
+        if let Some(attachments) = &mut self.attachments {
+            attachments.restore(points);
+        }
+    }
+
     /// Angles of the bodies (rad, anticlockwise), then rate (rad/s) and velocity of the centre of mass (cm/s) of each, then centre of mass and
-    /// velocity of the robot, then the directions of the last step's middle with their angles, then contact modes, then the memory of joint extensions.
+    /// velocity of the robot, then the directions of the last step's middle with their angles, then contact modes, then the memory of joint extensions and of what is fixed to the sheet.
     pub(super) fn state_numbers(&self) -> Vec<f64> {
         let bodies = || 0..self.count;
         let mut state: Vec<f64> = bodies().map(|i| self.of_body(i, |quad| quad.angle)).collect();
@@ -50,14 +65,14 @@ impl PlanarEngine {
         state.extend(bodies().flat_map(|i| [0, 1].map(|k| self.of_body(i, |quad| quad.along[k]))));
         state.extend(bodies().map(|i| self.of_body(i, |quad| quad.posed)));
         state.extend(self.floor.saved());
-        state.extend(self.extensions.iter().flat_map(JointExtensions::saved));
+        state.extend(self.saved_extensions());
         state
     }
 
     pub(super) fn set_state_numbers(&mut self, step: u64, state: &[f64]) -> Result<(), EngineError> {
         let count = self.count;
         let corners = self.floor.saved().count();
-        let memory = self.extensions.iter().flat_map(JointExtensions::saved).count();
+        let memory = self.saved_extensions().count();
         if state.len() != 7 * count + 4 + corners + memory || state.iter().any(|value| !value.is_finite()) {
             return Err(EngineError::State);
         }
@@ -78,9 +93,7 @@ impl PlanarEngine {
         self.fill_padding();
         (self.centre, self.velocity) = ([centre[0], centre[1]], [centre[2], centre[3]]);
         self.floor.restore(corners);
-        if let Some(extensions) = &mut self.extensions {
-            extensions.restore(memory);
-        }
+        self.restore_extensions(memory);
         self.finite = false;
         self.step = step;
         Ok(())

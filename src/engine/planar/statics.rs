@@ -12,7 +12,7 @@ use super::contact::FrictionCone;
 use super::lanes::{Four, Lanes, Two, inner};
 use super::law::ContactLaw;
 use super::quad::{Quad, direction};
-use super::recursion::BaseJoint;
+use super::recursion::Turn;
 use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
@@ -50,19 +50,22 @@ impl PlanarEngine {
             quad.inertia_at_reference = quad.inertia_at_reference * hold;
             quad.motion = Default::default();
         }
+        self.velocity = [0.0; 2];
+        self.finite = false;
         let base_joint = self.base_joint;
-        if let BaseJoint::Curved { ahead, share, .. } = &mut self.base_joint {
+        if let Some(Turn::Curved { ahead, share, .. }) = self.base_joint.turn() {
             // Displacements for velocities.
             (*ahead, *share) = (1.0, 1.0);
         }
-        self.velocity = [0.0; 2];
-        self.finite = false;
+        if let Some(slide) = self.base_joint.slide() {
+            slide.implicit = slide.stiffness;
+        }
         let settled = dispatch!(self.level, simd => self.settle_in_steps(simd, &dynamic));
+        self.base_joint = base_joint;
         for (quad, real) in self.quads.iter_mut().zip(&dynamic) {
             (quad.mass, quad.inertia, quad.implicit) = (real.mass, real.inertia, real.implicit);
             quad.inertia_at_reference = real.inertia_at_reference;
         }
-        self.base_joint = base_joint;
         self.floor.swap_cones(&mut cones);
         self.floor.clear();
         match settled? {
@@ -95,6 +98,14 @@ impl PlanarEngine {
                 }
                 before = last;
             }
+            if let Some(slide) = self.base_joint.slide() {
+                slide.impulse = -slide.stiffness * self.centre[1];
+            }
+            let height = if self.clamped() { self.centre[1] } else { self.root_motion(simd)[0][1] };
+            if let Some(attachments) = &mut self.attachments {
+                attachments.begin(&self.quads, height);
+                attachments.load_at_rest();
+            }
             self.find_corners(simd, &law);
             self.solve_on_floor(simd, &law)?;
             let turns = self.quads.iter().flat_map(|quad| quad.mean[0].to_array());
@@ -116,6 +127,8 @@ impl PlanarEngine {
             let rise = Lanes::from(rise).sum();
             if self.mount != Mount::Clamped {
                 self.centre[1] += share * rise;
+            } else if self.base_joint.slides() {
+                self.centre[1] += share * self.quads[0].mean[2].lane(0);
             }
             if largest <= SETTLED && rise.abs() <= SETTLED {
                 return Ok(true);

@@ -2,10 +2,10 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::joint_extensions::LARGEST_REPETITIONS;
+use super::joint_extensions::{JointExtensions, LARGEST_REPETITIONS};
 use super::lanes::{Four, Lanes, Two, fma, inner, on};
 use super::quad::{Motions, Quad};
-use super::recursion::BaseJoint;
+use super::recursion::{BaseJoint, Turn};
 use super::{EngineError, LARGEST_COORDINATE, PlanarEngine};
 use crate::actuator::PiezoJoint;
 
@@ -51,6 +51,9 @@ impl PlanarEngine {
             }
             quad.load(momentum);
         }
+        if let Some(slide) = self.base_joint.slide() {
+            slide.impulse = -share * slide.stiffness * self.centre[1];
+        }
         if self.floor.is_viscous() {
             let (height, _) = self.root_over_floor(simd);
             self.floor.push_viscous(&mut self.quads, height, share);
@@ -62,6 +65,9 @@ impl PlanarEngine {
     /// Solves for the step's mean motion; repeatedly where joints have dry friction.
     #[inline(always)]
     pub(super) fn solve_step<S: Simd>(&mut self, simd: S, share: f64) -> Result<(), EngineError> {
+        if self.attachments.is_some() {
+            return self.solve_attached(simd, share);
+        }
         let law = self.law;
         let Some(mut extensions) = self.extensions.take() else { return self.solve_on_floor(simd, &law) };
         extensions.begin(&self.quads);
@@ -80,6 +86,52 @@ impl PlanarEngine {
         extensions.end();
         self.extensions = Some(extensions);
         result
+    }
+
+    /// [`solve_step`](Self::solve_step) with tapes or cables at the sheet; repeatedly where they have friction, too.
+    #[inline(never)]
+    fn solve_attached<S: Simd>(&mut self, simd: S, share: f64) -> Result<(), EngineError> {
+        let (law, half) = (self.law, 0.5 * self.time_step);
+        let (mut extensions, height) = (self.extensions.take(), self.root_height(simd));
+        let Some(attachments) = &mut self.attachments else { return Ok(()) };
+        attachments.begin(&self.quads, height);
+        let is_repeated = attachments.is_repeated() || extensions.as_ref().is_some_and(JointExtensions::is_repeated);
+        if let Some(extensions) = &mut extensions {
+            extensions.begin(&self.quads);
+        }
+        let mut result = Ok(());
+        for repetition in 1..=LARGEST_REPETITIONS {
+            if let Some(extensions) = &mut extensions {
+                extensions.load(&mut self.quads, share);
+            }
+            if let Some(attachments) = &mut self.attachments {
+                attachments.load(half, share);
+            }
+            result = self.solve_on_floor(simd, &law);
+            if result.is_err() {
+                break;
+            }
+            let joints_agree = extensions.as_mut().is_none_or(|extensions| extensions.accept(&self.quads));
+            let points_agree = self.attachments.as_mut().is_none_or(|attachments| attachments.accept(&self.quads));
+            if (joints_agree && points_agree) || !is_repeated {
+                break;
+            }
+            if repetition == LARGEST_REPETITIONS {
+                let time = self.step as f64 * self.time_step;
+                result = Err(EngineError::NotConverged { iterations: repetition, step: self.step, time });
+            }
+        }
+        if let Some(extensions) = &mut extensions {
+            extensions.end();
+        }
+        self.extensions = extensions;
+        result
+    }
+
+    /// Height of the root's reference point (cm) in the middle of the step.
+    #[inline(always)]
+    fn root_height<S: Simd>(&self, simd: S) -> f64 {
+        if self.clamped() { self.centre[1] + 0.5 * self.time_step * self.slide_velocity() } else { self.root_over_floor(simd).0 }
     }
 
     /// Solves the step that was begun, and updates the state.
@@ -110,6 +162,9 @@ impl PlanarEngine {
             changed = fma(quad.inertia.on(simd) * turn, turn, fma(mass, fma(x, x, z * z), changed));
             momentum = [fma(share, after[1], momentum[0]), fma(share, after[2], momentum[1])];
         }
+        if self.base_joint.slides() {
+            self.centre[1] += h * self.quads[0].mean[2].lane(0);
+        }
         let changed = Lanes::from(changed).sum();
         self.finite = changed < LARGEST_COORDINATE;
         self.numerical_loss += (self.weight - 0.5) / (self.weight * self.weight) * changed;
@@ -129,7 +184,7 @@ impl PlanarEngine {
     #[inline(always)]
     pub(super) fn root_motion<S: Simd>(&self, simd: S) -> [[f64; 2]; 3] {
         if self.clamped() {
-            return [self.centre, [0.0; 2], [0.0; 2]];
+            return [self.centre, [0.0, self.slide_velocity()], [0.0; 2]];
         }
         let zero = Four::splat(simd, 0.0);
         let (mut position, mut velocity, mut acceleration) = ([zero; 2], [zero; 2], [zero; 2]);
@@ -165,11 +220,17 @@ pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: &
         let implicit = share * quad.stiffness * lag;
         quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
     }
-    if let BaseJoint::Curved { damping_time, ahead, share, .. } = base_joint {
-        (*ahead, *share) = (*damping_time + 0.5 * time_step, weight * time_step);
+    match base_joint.turn() {
+        Some(Turn::Hinged { damping_time }) => {
+            let stiffness = quads[0].stiffness.lane(0);
+            quads[0].implicit.set_lane(0, weight * time_step * stiffness * (*damping_time + 0.5 * time_step));
+        }
+        Some(Turn::Curved { damping_time, ahead, share, .. }) => {
+            (*ahead, *share) = (*damping_time + 0.5 * time_step, weight * time_step);
+        }
+        _ => {}
     }
-    if let BaseJoint::Hinged { damping_time } = base_joint {
-        let stiffness = quads[0].stiffness.lane(0);
-        quads[0].implicit.set_lane(0, weight * time_step * stiffness * (*damping_time + 0.5 * time_step));
+    if let Some(slide) = base_joint.slide() {
+        slide.implicit = weight * time_step * slide.stiffness * (slide.damping_time + 0.5 * time_step);
     }
 }

@@ -1,0 +1,270 @@
+//! Adopted causes: what each takes, how firmly it stands, what it is tied with, and what it counts for.
+
+use super::DiagnoseError;
+use super::causes::Causes;
+use super::curve::curve;
+use super::diagnosis::{Adopted, Estimate, Nearest, Part};
+use super::intervals::Intervals;
+use super::plant::{Model, Term};
+use super::search::{Scored, Search, VISIBLE};
+use super::stability::{Standing, standing};
+use super::ties::{Ties, pair_in_place};
+use super::unseen::Unseen;
+use super::verdict::Judged;
+
+/// Causes are minor that together remove no more than this share, ...
+const MINOR_SHARE: f64 = 0.02;
+/// ... those that remove less than this of χ² per value: half the noise, ...
+const MINOR_MISFIT: f64 = VISIBLE;
+/// ... and those that are chosen in a smaller share of resamples, unless they are tied.
+const LEAST_STABILITY: f64 = 0.8;
+
+/// The parameters of term `index` with their intervals.
+pub(super) fn estimates(search: &Search, index: usize, term: &Term, found: &Intervals) -> Vec<Estimate> {
+    let candidate = &search.estimator.plant.candidates()[term.candidate];
+    let first: usize = found.sizes[..index].iter().sum();
+    candidate
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(k, free)| {
+            let x = term.x[k];
+            let [low, high] = found.ends.get(first + k).copied().unwrap_or([x, x]);
+            let mut ends = [free.value(low), free.value(high)];
+            ends.sort_by(f64::total_cmp);
+            Estimate {
+                name: free.name.to_owned(),
+                value: free.value(x),
+                unit: free.unit.to_owned(),
+                ci95: ends.map(|end| end.is_finite().then_some(end)),
+                at_bound: x <= free.bounds[0] || x >= free.bounds[1],
+            }
+        })
+        .collect()
+}
+
+/// A cause with the model that lacks it.
+struct Weighed {
+    /// The model refitted without the cause.
+    without: Scored,
+    standing: Standing,
+    /// Causes, or sets of two, that the data cannot tell from it.
+    tied_with: Vec<String>,
+    /// The model with such a set.
+    pair: Option<Model>,
+}
+
+/// Weighs term `index` of `best`.
+fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<Weighed, DiagnoseError> {
+    (search.progress)(&format!("the gain of {}", search.id(best.model().terms[index].candidate)));
+    let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
+    let mut tied_with = ties.of(search, best, index);
+    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index))?;
+    let (set, pair) = pair_in_place(search, best, (&without, &screened), index, &tied_with)?.unzip();
+    tied_with.extend(set);
+    Ok(Weighed { without, standing, tied_with, pair })
+}
+
+/// Adopted causes and the judgement of the model with all of them.
+pub(super) struct Adoption {
+    /// All causes, the discretisation among them, with their shares and roles.
+    pub(super) effects: Vec<Adopted>,
+    /// The model on the runs that judge it.
+    pub(super) unseen: Unseen,
+    /// Models with two causes in the place of one, which the data cannot tell from it.
+    pub(super) pairs: Vec<Model>,
+}
+
+/// Weighs all causes of a model.
+///
+/// # Errors
+/// [`DiagnoseError`] if a model cannot be simulated.
+pub(super) fn adopted(
+    search: &Search,
+    judged: &Judged,
+    bare: &Scored,
+    causes: &Causes,
+    ties: &Ties,
+) -> Result<Adoption, DiagnoseError> {
+    let best = &judged.best;
+    let count = best.model().terms.len();
+    let weighed: Vec<Weighed> =
+        (0..count).map(|index| weighed(search, best, index, ties)).collect::<Result<_, DiagnoseError>>()?;
+    let needs: Vec<&[usize]> = weighed.iter().map(|weighed| weighed.standing.needs.as_slice()).collect();
+    let unseen = Unseen::of(search, best, &needs)?;
+    let mut effects = Vec::new();
+    if judged.refined {
+        let coarse = Unseen::of(search, &judged.coarse, &needs)?;
+        effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
+    }
+    let (whole, mut taken) = (Whole::of(search, best, bare)?, vec![0.0; effects.len()]);
+    for (index, Weighed { without, standing, tied_with, .. }) in weighed.iter().enumerate() {
+        let mut others = needs.clone();
+        others.remove(index);
+        let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others)?, search);
+        let mut effect = effect(search, judged, index, standing, tied_with);
+        let own = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
+        taken.push(own);
+        effect.share = whole.share(own, search.candidate(&best.model().terms[index]).is_constant);
+        effect.gain_heldout = gain_heldout;
+        let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
+        let of_place =
+            causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
+        effect.nearest = of_place.map(|(_, tried)| tried.clone()).unwrap_or_default();
+        effects.push(effect);
+    }
+    set_roles(&mut effects, &taken);
+    let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
+    Ok(Adoption { effects, unseen, pairs })
+}
+
+/// Term `index` as an adopted cause, without its share and gain.
+fn effect(search: &Search, judged: &Judged, index: usize, standing: &Standing, tied_with: &[String]) -> Adopted {
+    let best = &judged.best;
+    let term = &best.model().terms[index];
+    let candidate = search.candidate(term);
+    // The actuator was found by trying all of them; other given parameters are the form of the equation.
+    let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().copied().partition(|(name, _)| *name == "actuator");
+    let which = found_by_trying.into_iter().map(|(name, value)| Estimate {
+        name: name.to_owned(),
+        value,
+        unit: String::new(),
+        ci95: [Some(value); 2],
+        at_bound: false,
+    });
+    Adopted {
+        id: candidate.id.to_owned(),
+        kind: candidate.kind.to_owned(),
+        place: candidate.places.first().copied().unwrap_or(candidate.kind).to_owned(),
+        cause: candidate.cause.to_owned(),
+        parameters: which.chain(estimates(search, index, term, &judged.intervals)).collect(),
+        tied_with: tied_with.to_vec(),
+        share: 0.0,
+        role: if standing.is_left_by_law { Part::Minor } else { Part::Cause },
+        stability: standing.stability,
+        curve: curve(search, best, index, &judged.intervals),
+        nearest: Vec::new(),
+        gain_heldout: 0.0,
+        fixed: form.into_iter().map(|(name, value)| (name.to_owned(), value)).collect(),
+    }
+}
+
+/// What causes have to explain, as χ² per value above that of the model with all of them.
+struct Whole {
+    /// Left by the refined nominal model: what constants share.
+    bare: f64,
+    /// Left by the refined nominal model with re-tuned constants: what other causes share.
+    tuned: f64,
+}
+
+impl Whole {
+    fn of(search: &Search, best: &Scored, bare: &Scored) -> Result<Self, DiagnoseError> {
+        let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
+        let tuned = search.fitted_at_its_spread(&tuned)?;
+        let count = search.estimator.count(&search.split.all()) as f64;
+        let left = |scored: &Scored| ((search.chi2(scored) - search.chi2(best)) / count).max(f64::MIN_POSITIVE);
+        Ok(Self { bare: left(bare), tuned: left(&tuned) })
+    }
+
+    /// The share of a cause that removes `own` (χ² per value).
+    fn share(&self, own: f64, is_constant: bool) -> f64 {
+        (own / if is_constant { self.bare } else { self.tuned }).clamp(0.0, 1.0)
+    }
+}
+
+/// Sets the roles of causes, from their shares and what each removes (χ² per value).
+fn set_roles(effects: &mut [Adopted], taken: &[f64]) {
+    let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
+    order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
+    let mut sum = 0.0;
+    // What slope of a loop is called its gain is a convention: within the opening of the loop a gain is no cause of its own.
+    let value = |id: &str, name: &str| {
+        let effect = effects.iter().find(|effect| effect.id == id)?;
+        effect.parameters.iter().find(|p| p.name == name).map(|p| p.value)
+    };
+    let is_convention = match (value("hysteresis", "width"), value("actuation-gain", "scale")) {
+        (Some(width), Some(scale)) => (scale - 1.0).abs() < width,
+        _ => false,
+    };
+    for k in order {
+        sum += effects[k].share;
+        let effect = &mut effects[k];
+        // A tied one says what else may be chosen.
+        let is_unstable = effect.stability.is_some_and(|share| share < LEAST_STABILITY) && effect.tied_with.is_empty();
+        let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT;
+        if is_small || is_unstable || (is_convention && effect.id == "actuation-gain") {
+            effect.role = Part::Minor;
+        }
+    }
+}
+
+/// The refinement as an adopted cause.
+fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted {
+    let resolutions = search.estimator.plant.resolutions();
+    let at = resolutions.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
+    let neighbours = [at.saturating_sub(1), (at + 1).min(resolutions.len() - 1)].map(|k| Some(resolutions[k]));
+    Adopted {
+        id: "discretisation".into(),
+        kind: "numerics".into(),
+        place: "numerics/discretisation".into(),
+        cause: "Finitely many joints and a finite time step stand for a continuum.".into(),
+        parameters: vec![Estimate {
+            name: "motors_per_actuator".into(),
+            value: best.model().resolution,
+            unit: String::new(),
+            ci95: neighbours,
+            at_bound: at + 1 == resolutions.len(),
+        }],
+        tied_with: Vec::new(),
+        share: 0.0,
+        role: Part::Cause,
+        stability: None,
+        curve: None,
+        nearest: Vec::new(),
+        gain_heldout,
+        fixed: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cause(id: &str, share: f64, stability: Option<f64>, tied_with: &[&str]) -> Adopted {
+        Adopted {
+            id: id.into(),
+            kind: "test".into(),
+            place: "test".into(),
+            cause: String::new(),
+            parameters: Vec::new(),
+            tied_with: tied_with.iter().map(|id| (*id).to_owned()).collect(),
+            share,
+            role: Part::Cause,
+            stability,
+            curve: None,
+            nearest: Vec::new(),
+            gain_heldout: 0.0,
+            fixed: Vec::new(),
+        }
+    }
+
+    /// Roles of causes that remove 1 of χ² per value each.
+    fn roles(mut effects: Vec<Adopted>) -> Vec<Part> {
+        let taken = vec![1.0; effects.len()];
+        set_roles(&mut effects, &taken);
+        effects.iter().map(|effect| effect.role).collect()
+    }
+
+    #[test]
+    fn small_and_unstable_causes_are_minor_and_tied_ones_are_not() {
+        use Part::{Cause, Minor};
+        let shares = [0.9, 0.008, 0.011, 0.013].map(|share| cause("a", share, Some(1.0), &[]));
+        // The last two per cent: 0.8 and 1.1 % together, not 1.3 % more.
+        assert_eq!(roles(shares.to_vec()), [Cause, Minor, Minor, Cause]);
+        let stabilities = [cause("a", 0.9, Some(0.79), &[]), cause("b", 0.9, Some(0.79), &["c"]), cause("d", 0.9, None, &[])];
+        assert_eq!(roles(stabilities.to_vec()), [Minor, Cause, Cause]);
+        let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
+        set_roles(&mut within_the_noise, &[0.2]);
+        assert_eq!(within_the_noise[0].role, Minor);
+    }
+}

@@ -1,0 +1,168 @@
+//! The causes of a misfit: selected without and with faults of the bench, named at their places, and refitted.
+
+use super::DiagnoseError;
+use super::diagnosis::Nearest;
+use super::naming::{self, Naming};
+use super::plant::Model;
+use super::search::{SOUGHT, Scored, Search, Trial};
+use super::verdict::LEFT_SHARE;
+
+/// A model selected without the bench's faults counts if its cost, with ln N for each coordinate, is lower by this.
+const LEAST_COST: f64 = 10.0;
+
+/// Result of the search.
+pub(super) struct Causes {
+    /// The model with all causes, after the final refit.
+    pub(super) best: Scored,
+    /// The candidates on top of re-tuned constants, best first.
+    pub(super) trials: Vec<Trial>,
+    /// Replacements of every cause: the candidate that is removed, and the trial.
+    pub(super) replaced: Vec<(usize, Trial)>,
+    /// χ² of the best model before the final refit, with which replacements are compared.
+    pub(super) coarse_total: f64,
+    /// Number of single values that were masked.
+    pub(super) spikes: usize,
+    /// Share of what re-tuned constants leave that the causes leave before faults of the bench.
+    pub(super) share_left: f64,
+    /// χ² per value above 1 of the model with free forms; infinite without any.
+    pub(super) open: f64,
+    /// The places of every free form, and the names that were tried in its stead.
+    pub(super) nearest: Vec<(Vec<&'static str>, Vec<Nearest>)>,
+}
+
+/// The causes, after the final refit; none where the data are insufficient.
+///
+/// A cause that differs from run to run, such as a gain that depends on the voltage, looks like a fault of the bench, and many small faults look like a
+/// cause. So causes are selected first without the bench's faults in the way. If faults are left after that, they are selected again with faults in
+/// the way, and the less costly model counts.
+///
+/// # Errors
+/// [`DiagnoseError`] if a model cannot be simulated.
+pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
+    let before = (search.estimator.state(), search.split.clone());
+    let without = search.estimator.given_spread();
+    let has_faults = calibrated.model().spread != without;
+    search.estimator.held_spread = has_faults.then_some(without);
+    let start = if has_faults {
+        search.settle(search.fitted(&Model { spread: without, ..calibrated.model().clone() })?)?
+    } else {
+        calibrated.clone()
+    };
+    search.set_unexplained(&start);
+    // Two causes that cost more than the bench's faults alone are not what is missing where these leave next to nothing.
+    let may_be_all = has_faults && search.share_left(calibrated) <= LEFT_SHARE;
+    search.limit = if may_be_all { search.cost(calibrated) } else { f64::INFINITY };
+    let mut causes = select(search, &start, is_insufficient)?;
+    search.limit = f64::INFINITY;
+    // Causes that leave next to nothing without any fault are no faults.
+    let may_be_faults = has_faults && causes.share_left > SOUGHT;
+    if may_be_faults && (causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated)) {
+        (search.progress)("causes with faults of the bench in the way");
+        let plain = search.cost(&causes.best);
+        let after = (search.estimator.state(), search.split.clone());
+        search.estimator.restore(before.0);
+        search.split = before.1;
+        search.set_unexplained(calibrated);
+        let other = select(search, calibrated, is_insufficient)?;
+        if search.cost(&other.best) <= plain + LEAST_COST {
+            causes = other;
+        } else {
+            search.estimator.restore(after.0);
+            search.split = after.1;
+            search.set_unexplained(&start);
+        }
+    }
+    // What a name leaves, and what a cause takes, is no fault of the bench.
+    search.estimator.held_spread = Some(causes.best.model().spread);
+    name_causes(search, &mut causes)?;
+
+    (search.progress)("the final refit");
+    let mut best = search.fitted(&Model { fine: true, ..causes.best.model().clone() })?;
+    best = search.resolve(best);
+    best = search.backward(best)?;
+    causes.best = search.settle(best)?;
+    Ok(causes)
+}
+
+/// Puts names in the stead of free forms where they stand.
+fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseError> {
+    let has_free_forms =
+        |search: &Search, scored: &Scored| scored.model().terms.iter().any(|term| search.candidate(term).is_free_form);
+    if !has_free_forms(search, &causes.best) {
+        return Ok(());
+    }
+    causes.open = search.above(&causes.best);
+    let before = causes.best.model().clone();
+    let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
+    causes.nearest = nearest;
+    causes.best = search.backward(best)?;
+    let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
+    if ids(causes.best.model()) != ids(&before) {
+        causes.replaced = search.replacements(&causes.best, 4)?;
+    }
+    causes.coarse_total = causes.best.total();
+    Ok(())
+}
+
+/// Forward selection, backward elimination and replacement; no causes where the data are insufficient.
+fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
+    let (mut best, trials) = if is_insufficient {
+        (search.fitted(&Model { terms: Vec::new(), ..calibrated.model().clone() })?, Vec::new())
+    } else {
+        search.forward(calibrated.clone())?
+    };
+    if search.is_given_up(&best) {
+        search.estimator.held_spread = None;
+        return Ok(Causes {
+            coarse_total: best.total(),
+            best,
+            trials,
+            replaced: Vec::new(),
+            spikes: 0,
+            share_left: 1.0,
+            open: f64::INFINITY,
+            nearest: Vec::new(),
+        });
+    }
+    let spikes = search.estimator.leave_out_spikes(best.model())?;
+    if spikes > 0 {
+        best = search.settle(best)?;
+    }
+    best = search.resolve(best);
+    best = search.backward(best)?;
+    best = search.resolve(best);
+    let share_left = search.share_left(&best);
+    // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
+    if share_left > SOUGHT && search.estimator.held_spread.take().is_some() {
+        best = search.settle(best)?;
+        best = search.backward(best)?;
+    }
+
+    let mut replaced: Vec<(usize, Trial)> = Vec::new();
+    for _ in 0..2 {
+        if is_insufficient || best.model().terms.is_empty() {
+            break;
+        }
+        replaced = search.replacements(&best, 4)?;
+        let better = replaced
+            .iter()
+            .filter(|(_, trial)| {
+                let other = &trial.scored;
+                let simpler = other.freedom() < best.freedom() && search.is_tied(&best, other);
+                simpler || (other.total() < best.total() && !search.is_tied(other, &best))
+            })
+            .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
+            .map(|(_, trial)| trial.scored.clone());
+        let Some(better) = better else { break };
+        best = search.settle(better)?;
+        best = search.backward(best)?;
+        // A cause in a constant's place lets the constant stay free beside it.
+        best = search.with_significant_constants(best)?;
+    }
+    let faults_come_last = search.estimator.held_spread.take().is_some();
+    if search.measure_noise(&best)? || faults_come_last {
+        best = search.settle(best)?;
+    }
+    let coarse_total = best.total();
+    Ok(Causes { best, trials, replaced, coarse_total, spikes, share_left, open: f64::INFINITY, nearest: Vec::new() })
+}

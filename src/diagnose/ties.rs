@@ -1,0 +1,109 @@
+//! Ties: other causes, or two others together, that explain the data as well as an adopted one.
+
+use super::DiagnoseError;
+use super::plant::{Model, Term};
+use super::search::{Scored, Screened, Search, Trial};
+
+/// Replacements are refitted like the best model if their χ² exceeds its own by no more than this.
+const NEAR_TIE: f64 = 500.0;
+/// Two causes together are fitted in the place of one if their linear estimate is at least this share of what it takes.
+const PROMISING_PAIR: f64 = 0.9;
+
+/// A replacement of an adopted cause.
+struct Replacement {
+    /// Index of the adopted term.
+    index: usize,
+    /// The model with the replacement as its last term.
+    trial: Trial,
+    is_tied: bool,
+}
+
+/// Replacements of all adopted causes.
+pub(super) struct Ties {
+    replacements: Vec<Replacement>,
+}
+
+impl Ties {
+    /// Compares the replacements that the search has `replaced` (the removed candidate, and the model without it) with the final model `best`; those
+    /// near it (`coarse_total` is its χ² before the final refit) are refitted in the same way.
+    pub(super) fn new(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_total: f64) -> Self {
+        let compared = |(removed, trial): &(usize, Trial)| {
+            let index = best.model().terms.iter().position(|term| term.candidate == *removed)?;
+            let (terms, of_best) = (&trial.scored.model().terms, &best.model().terms);
+            let is_of_best = |term: &Term| of_best.iter().any(|own| own.candidate == term.candidate);
+            let has_others =
+                terms.len() == of_best.len() && terms.iter().filter(|term| term.candidate != trial.candidate).all(is_of_best);
+            if !has_others || search.id(*removed) == search.id(trial.candidate) {
+                return None;
+            }
+            let is_near = trial.scored.freedom() <= best.freedom() && trial.scored.total() < coarse_total + NEAR_TIE;
+            let Model { resolution, fine, .. } = *best.model();
+            let again = || search.fitted(&Model { resolution, fine, ..trial.scored.model().clone() }).ok();
+            Some(match is_near.then(again).flatten() {
+                Some(scored) => {
+                    let is_tied = search.is_tied(best, &scored);
+                    Replacement { index, trial: Trial { scored, ..trial.clone() }, is_tied }
+                }
+                None => Replacement { index, trial: trial.clone(), is_tied: false },
+            })
+        };
+        Self { replacements: replaced.iter().filter_map(compared).collect() }
+    }
+
+    /// Fitted replacements of term `index`.
+    pub(super) fn rivals_of(&self, index: usize) -> Vec<&Trial> {
+        self.replacements.iter().filter(|other| other.index == index).map(|other| &other.trial).collect()
+    }
+
+    /// Ids of the causes that the data cannot tell from that of term `index` of `best`.
+    pub(super) fn of(&self, search: &Search, best: &Scored, index: usize) -> Vec<String> {
+        let own = search.id(best.model().terms[index].candidate);
+        let tied = self.replacements.iter().filter(|other| other.index == index && other.is_tied);
+        let mut ids: Vec<String> = tied.map(|other| search.id(other.trial.candidate).to_owned()).collect();
+        ids.sort();
+        ids.dedup();
+        ids.retain(|id| id != own);
+        ids
+    }
+
+    /// The models that the data cannot tell from the best one.
+    pub(super) fn models(&self) -> impl Iterator<Item = &Scored> {
+        self.replacements.iter().filter(|other| other.is_tied).map(|other| &other.trial.scored)
+    }
+
+    /// The terms that are tied with an adopted one.
+    pub(super) fn terms(&self) -> Vec<&Term> {
+        self.models().filter_map(|scored| scored.model().terms.last()).collect()
+    }
+}
+
+/// Two causes together that the data cannot tell from term `index` of `best`, which `without` lacks: their ids with a plus sign, and the model with them;
+/// none if there are none, or if one of them is tied alone.
+///
+/// # Errors
+/// [`DiagnoseError`] if `without` cannot be simulated.
+pub(super) fn pair_in_place(
+    search: &Search,
+    best: &Scored,
+    (without, screened): (&Scored, &Screened),
+    index: usize,
+    tied: &[String],
+) -> Result<Option<(String, Model)>, DiagnoseError> {
+    let own = search.candidate(&best.model().terms[index]);
+    let taken = without.total() - best.total();
+    // A cause within the noise, or with several parameters of its own, is not taken apart.
+    if own.is_free_form || taken < NEAR_TIE || own.parameters.len() > 1 {
+        return Ok(None);
+    }
+    let is_wanted = |term: &Term| {
+        let id = search.id(term.candidate);
+        id != own.id && !tied.iter().any(|tied| tied == id)
+    };
+    let Some(pair) = search.pair(without.model(), screened, PROMISING_PAIR * taken, is_wanted) else { return Ok(None) };
+    (search.progress)(&format!("two causes in the place of {}", own.id));
+    let start = search.start_beyond(&pair, screened)?;
+    let Ok(both) = search.fitted_at_its_spread(&start) else { return Ok(None) };
+    let ids: Vec<&str> = pair.terms.iter().rev().take(2).map(|term| search.id(term.candidate)).collect();
+    let set = format!("{}+{}", ids[1].min(ids[0]), ids[1].max(ids[0]));
+    Ok(search.is_tied(best, &both).then(|| (set, both.model().clone())))
+}

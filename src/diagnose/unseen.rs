@@ -1,0 +1,174 @@
+//! Errors on runs that neither parameters nor selection saw.
+//!
+//! With enough runs some are kept to judge by, and seen once, at the end. With few runs the judgement is a nested cross-validation: each fold of the runs
+//! in turn is left out, the causes that would not be worth it without it are left out as well, the parameters are fitted to all other runs, and the fold is
+//! judged.
+
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::diagnosis::JudgedBy;
+use super::fit::{Convergence, Residuals, sum_of_squares};
+use super::plant::Model;
+use super::search::{Scored, Search};
+
+/// Residuals of a model on the runs that judge it.
+pub(super) struct Unseen {
+    /// The runs, ...
+    pub(super) runs: Vec<usize>,
+    /// ... their residuals in given σ, ...
+    pub(super) plain: Vec<Residuals>,
+    /// ... and χ² of whitened ones.
+    chi2: f64,
+}
+
+impl Unseen {
+    /// What judges the models of a search.
+    pub(super) fn by(search: &Search) -> JudgedBy {
+        if search.split.judge.is_empty() { JudgedBy::CrossValidation } else { JudgedBy::JudgeRuns }
+    }
+
+    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be worth it.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn of(search: &Search, scored: &Scored, needs: &[&[usize]]) -> Result<Self, DiagnoseError> {
+        let (mut runs, mut models) = (Vec::new(), Vec::new());
+        for run in &search.split.judge {
+            runs.push(*run);
+            models.push(scored.model().clone());
+        }
+        for (fold, left_out) in search.split.folds().into_iter().enumerate() {
+            let model = Self::without(search, scored.model(), (fold, &left_out), needs)?;
+            models.extend(left_out.iter().map(|_| model.clone()));
+            runs.extend(left_out);
+        }
+        let judged = |(run, model): (&usize, &Model)| {
+            let chi2 = sum_of_squares(&search.estimator.residuals(model, *run)?);
+            Ok((search.estimator.plain_residuals_of(model, *run)?, chi2))
+        };
+        let judged: Vec<(Residuals, f64)> = runs.par_iter().zip(&models).map(judged).collect::<Result<_, DiagnoseError>>()?;
+        let (plain, chi2): (Vec<_>, Vec<f64>) = judged.into_iter().unzip();
+        Ok(Self { runs, plain, chi2: chi2.iter().sum() })
+    }
+
+    /// The model as it is found without a fold.
+    fn without(
+        search: &Search,
+        model: &Model,
+        (fold, left_out): (usize, &[usize]),
+        needs: &[&[usize]],
+    ) -> Result<Model, DiagnoseError> {
+        let is_found = |index: &usize| needs.get(*index).is_none_or(|needs| !needs.contains(&fold));
+        let terms = (0..model.terms.len()).filter(is_found).map(|index| model.terms[index].clone()).collect();
+        let others: Vec<usize> = search.split.all().into_iter().filter(|other| !left_out.contains(other)).collect();
+        let model = Model { terms, ..model.clone() };
+        // Nothing can be fitted without another run.
+        if others.is_empty() || model.terms.is_empty() {
+            return Ok(model);
+        }
+        Ok(search.estimator.fit(&model, &others, Convergence::Rank)?.model)
+    }
+
+    /// Share of χ² above the noise that this model removes from another one's (0 to 1).
+    pub(super) fn gain_over(&self, without: &Self, search: &Search) -> f64 {
+        let above = without.chi2 - search.estimator.count(&self.runs) as f64;
+        if above > 0.0 { ((without.chi2 - self.chi2) / above).clamp(0.0, 1.0) } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fit::Estimator;
+    use crate::diagnose::plant::{Candidate, Free, Nuisance, Plant, Signal, Term};
+    use crate::diagnose::search::Search;
+    use crate::diagnose::split::Split;
+
+    /// y = x + noise of 1, −1, ... in each run; the mean of the runs differs.
+    struct Means {
+        signals: Vec<Signal>,
+        candidates: Vec<Candidate>,
+    }
+
+    impl Plant for Means {
+        fn signals(&self) -> &[Signal] {
+            &self.signals
+        }
+
+        fn channels(&self) -> Vec<String> {
+            vec!["y".into()]
+        }
+
+        fn unit(&self) -> &'static str {
+            ""
+        }
+
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+
+        fn predict(&self, model: &Model, run: usize, _: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
+            Ok(vec![model.terms.iter().map(|term| term.x[0]).sum(); self.signals[run].values.len()])
+        }
+    }
+
+    fn plant(means: &[f64]) -> Means {
+        let signal = |mean: &f64| Signal {
+            values: (0..4).map(|at| mean + if at % 2 == 0 { 1.0 } else { -1.0 }).collect(),
+            sigmas: vec![1.0; 4],
+            times: (0..4).map(f64::from).collect(),
+            channels: vec![0; 4],
+            inputs: vec![0.0; 4],
+            ..Signal::default()
+        };
+        let free = Free { name: "x", unit: "", off: Some(0.0), bounds: [-100.0, 100.0], scale: 1.0, inverse: false };
+        let candidate = Candidate {
+            id: "mean",
+            kind: "test",
+            cause: "A mean.",
+            places: vec!["test"],
+            is_free_form: false,
+            is_variant: false,
+            is_constant: false,
+            parameters: vec![free],
+            fixed: Vec::new(),
+            starts: vec![vec![1.0]],
+        };
+        Means { signals: means.iter().map(signal).collect(), candidates: vec![candidate] }
+    }
+
+    fn search<'a>(plant: &'a Means, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
+        Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY }
+    }
+
+    #[test]
+    fn each_run_is_judged_by_what_the_others_say() {
+        let plant = plant(&[3.0, 6.0, 9.0]);
+        let search = search(&plant, Split { fit: vec![0, 1], select: vec![2], judge: vec![] }, &|_| {});
+        let mean = Model::new(vec![Term { candidate: 0, x: vec![4.5] }], 1.0, false);
+        let (with, without) = (search.fitted(&mean).unwrap(), search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap());
+        assert_eq!(Unseen::by(&search), JudgedBy::CrossValidation);
+        // Without run k the mean of the others is 7.5, 6 and 4.5: off by −4.5, 0 and 4.5.
+        let unseen = Unseen::of(&search, &with, &[&[]]).unwrap();
+        let means: Vec<f64> = unseen.plain.iter().map(|r| r.iter().sum::<f64>() / 4.0).collect();
+        assert!(means.iter().zip([-4.5, 0.0, 4.5]).all(|(a, b)| (a - b).abs() < 1e-6), "{means:?}");
+        // χ² is 4 (m² + 1) a run: 12 + 162 of the model, 12 + 504 without it, of which 12 are noise.
+        let gain = unseen.gain_over(&Unseen::of(&search, &without, &[]).unwrap(), &search);
+        assert!((gain - 342.0 / 504.0).abs() < 1e-6, "{gain}");
+        // A fold without which the cause is not worth it is judged without the cause.
+        let unseen = Unseen::of(&search, &with, &[&[2]]).unwrap();
+        assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn runs_that_judge_are_seen_by_nothing_else() {
+        let plant = plant(&[3.0, 5.0, 4.0, 90.0]);
+        let search = search(&plant, Split { fit: vec![0, 1], select: vec![2], judge: vec![3] }, &|_| {});
+        let scored = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![0.0] }], 1.0, false)).unwrap();
+        assert!((scored.model().terms[0].x[0] - 4.0).abs() < 1e-6);
+        let unseen = Unseen::of(&search, &scored, &[&[]]).unwrap();
+        assert_eq!((Unseen::by(&search), unseen.runs.clone()), (JudgedBy::JudgeRuns, vec![3]));
+        assert!((unseen.plain[0].iter().sum::<f64>() / 4.0 - 86.0).abs() < 1e-6);
+    }
+}
