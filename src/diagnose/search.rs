@@ -306,7 +306,6 @@ impl Search<'_> {
         for _ in 0..MOST_TURNS {
             let before = scored.total();
             self.estimator.set_faults(scored.model())?;
-            self.estimator.fit_nuisances(scored.model(), &all)?;
             scored = self.fitted(scored.model())?;
             if before - scored.total()
                 < 1e-3 * (before - self.estimator.count(&all) as f64).max(self.estimator.count(&all) as f64)
@@ -665,17 +664,20 @@ impl Search<'_> {
         Ok((best, first.unwrap_or_default()))
     }
 
-    /// The model with another law of the cause of term `index`, if that is significantly better.
+    /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
     ///
     /// # Errors
     /// [`DiagnoseError`] if a better law cannot be fitted to the end.
     fn with_its_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
+        if own.is_variant {
+            return self.with_its_plain_law(scored, index);
+        }
         let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
         for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
-            if variant.id != own.id || !variant.is_variant || own.is_variant {
+            if variant.id != own.id || !variant.is_variant {
                 continue;
             }
             let mut tried: Vec<Vec<f64>> = Vec::new();
@@ -698,6 +700,30 @@ impl Search<'_> {
         let Some(best) = best else { return Ok(scored) };
         let best = self.fitted(best.model())?;
         Ok(if self.is_significant(&best, &scored) { best } else { scored })
+    }
+
+    /// The model with the plain law of the cause of term `index`, unless its own law is significantly better.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the plain law cannot be fitted.
+    pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
+        let term = &scored.model().terms[index];
+        let own = self.candidate(term);
+        if !own.is_variant {
+            return Ok(scored);
+        }
+        let of_plain = |candidate: usize| {
+            let plain = &self.estimator.plant.candidates()[candidate];
+            let at = |free: &Free| own.parameters.iter().position(|p| p.name == free.name).map(|at| term.x[at]);
+            let x = plain.parameters.iter().map(at).collect::<Option<Vec<f64>>>()?;
+            (plain.id == own.id && !plain.is_variant).then_some(Term { candidate, x })
+        };
+        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return Ok(scored) };
+        (self.progress)(&format!("the plain law of {}", own.id));
+        let mut model = scored.model().clone();
+        model.terms[index] = plain;
+        let plain = self.fitted_at_its_spread(&model)?;
+        Ok(if self.is_significant(&scored, &plain) { scored } else { plain })
     }
 
     /// Sets what re-tuned constants leave to what `constants` leaves.
