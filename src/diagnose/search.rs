@@ -340,9 +340,12 @@ impl Search<'_> {
     /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
-        let (_, gain) = self.gap(more, less, runs);
-        let count = self.estimator.count(runs) as f64;
-        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
+        self.gap(more, less, runs).1 > self.worth(runs) && self.is_significant(more, less)
+    }
+
+    /// The least fall of χ² of `runs` for which a cause is adopted.
+    fn worth(&self, runs: &[usize]) -> f64 {
+        self.estimator.count(runs) as f64 * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
     }
 
     /// True if a free form is better than a name on the select runs and by BIC.
@@ -650,7 +653,7 @@ impl Search<'_> {
             };
             // The discretisation and the laws are refined before another cause could take their errors.
             let settled = self.settle(worthy)?;
-            best = self.resolve(settled);
+            best = self.resolve(settled, Convergence::Rank);
             for index in 0..best.model().terms.len() {
                 best = self.with_its_law(best, index)?;
             }
@@ -921,8 +924,13 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// The discretisation with the least χ² over all runs, by steps from the present one.
-    pub fn resolve(&self, best: Scored) -> Scored {
+    /// The discretisation with the least χ² over all runs, by steps from the present one. To rank models, steps end where they lower χ² by less than half
+    /// of what a cause would have to: finer models cost more, and the error that is left is adopted as no cause.
+    pub fn resolve(&self, best: Scored, convergence: Convergence) -> Scored {
+        let least = match convergence {
+            Convergence::Rank => 0.5 * self.worth(&self.split.all()),
+            Convergence::Full => 0.0,
+        };
         let resolutions = self.estimator.plant.resolutions();
         let mut best = best;
         let mut tried = vec![best.model().resolution];
@@ -935,7 +943,7 @@ impl Search<'_> {
                 (self.progress)(&format!("{resolution} joints per actuator"));
                 // A discretisation in which the model diverges is none for it.
                 let Ok(other) = self.fitted(&Model { resolution, ..best.model().clone() }) else { continue };
-                if other.total() < best.total() {
+                if other.total() < best.total() - least {
                     best = other;
                     moved = true;
                     break;

@@ -19,9 +19,10 @@ mod robot;
 pub mod units;
 
 pub use curve::{CURVE_POINTS, Curve};
+pub(crate) use extensions::LEAST_DRAG_RATIO;
 pub use extensions::{
     AIR_DENSITY, ATTACHMENT_RATE, Attachment, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS,
-    LOSS_TIMES, PointMass, Slip, StickSlip, VISCOUS_REACH,
+    LOSS_TIMES, PointMass, SOFTENING_CURVATURE, Slip, StickSlip, VISCOUS_REACH,
 };
 pub use laminate::{Laminate, Material};
 pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment, box_inertia};

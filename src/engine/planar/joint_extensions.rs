@@ -13,7 +13,9 @@ use wide::f64x2;
 use super::lanes::Lanes;
 use super::quad::Quad;
 use crate::engine::GAUSS;
-use crate::model::{DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
+use crate::model::{
+    AIR_DENSITY, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_DRAG_RATIO, LEAST_STIFFNESS, LOSS_TIMES, SOFTENING_CURVATURE,
+};
 
 /// Repetitions end when no friction torque changes by more than this fraction of its moment; after `LARGEST_REPETITIONS` they fail.
 const FRICTION_ENOUGH: f64 = 1e-3;
@@ -113,7 +115,7 @@ impl JointExtensions {
     #[inline(always)]
     fn resisting_at(&self, k: usize, rate: Lanes) -> [Lanes; 2] {
         let Extensions { dry_friction, moment_of_rate, .. } = &self.extensions;
-        let share = (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh();
+        let share = if *dry_friction == 0.0 { Lanes::ZERO } else { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() };
         let moment = Lanes::splat(*dry_friction) * share;
         let slope = Lanes::splat(dry_friction / DRY_FRICTION_RATE) * (Lanes::splat(1.0) - share * share);
         if moment_of_rate.is_zero() {
@@ -153,18 +155,22 @@ impl JointExtensions {
     fn elastic(&self, k: usize, quad: &Quad, delta: Lanes) -> (Lanes, Lanes) {
         let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
         if self.softening != 0.0 {
-            let most = 1.0 - LEAST_STIFFNESS;
+            // As `Extensions::softened`.
+            let most = Lanes::splat(1.0 - LEAST_STIFFNESS);
             let exponent = self.extensions.softening_exponent;
-            let [softened, tangent] = self.of_joints(k, |lane| {
-                let delta = delta.lane(lane);
-                let share = match exponent {
-                    2.0 => self.softening * delta * delta,
-                    _ => self.extensions.softened(delta / self.link),
-                };
-                [share.min(most) * delta, if share < most { (exponent + 1.0) * share } else { most }]
-            });
-            torque = quad.stiffness * softened;
-            slope = quad.stiffness * tangent;
+            let power = match exponent {
+                2.0 => delta * delta,
+                _ => {
+                    let unit = self.link * SOFTENING_CURVATURE;
+                    let relative = (Lanes::splat(1.0 / unit) * delta.abs()).at_least(f64::MIN_POSITIVE);
+                    Lanes::splat(unit * unit) * relative.powf(exponent)
+                }
+            };
+            let share = Lanes::splat(self.softening) * power;
+            let is_free = most - share;
+            let stiffness = self.joint[k] * quad.stiffness;
+            torque = stiffness * share.where_positive(is_free, most) * delta;
+            slope = stiffness * (Lanes::splat(exponent + 1.0) * share).where_positive(is_free, most);
         }
         let curve = &self.extensions.moment_of_curvature;
         if !curve.is_zero() {
@@ -338,16 +344,25 @@ impl JointExtensions {
     }
 
     /// Drag on the bodies: moment about the centre of mass (dyn·cm) and force (dyn).
+    #[inline(always)]
     pub(super) fn drag(&self, quad: &Quad) -> [Lanes; 3] {
         let [rate, x, z] = quad.motion;
         let normal = [-quad.along[1], quad.along[0]];
         let speed = x * normal[0] + z * normal[1];
+        let Extensions { drag: [linear, quadratic, cubic], drag_of_power: [coefficient, power], .. } = self.extensions;
+        let [linear, quadratic, cubic] = [linear, quadratic, cubic].map(Lanes::splat);
+        let whole = Lanes::splat(-0.5 * 0.5 * AIR_DENSITY * self.width * DRAG_SPEED) * quad.reach.abs();
         let (mut force, mut moment) = (Lanes::ZERO, Lanes::ZERO);
         for (at, weight) in GAUSS {
             let arm = (Lanes::splat(0.5 + 0.5 * at) - quad.middle) * quad.reach;
             let speed = speed + rate * arm;
-            let per_speed = speed.map(|v| if v == 0.0 { 0.0 } else { self.extensions.drag_per_speed(self.width, v) });
-            let part = Lanes::splat(-0.5 * weight) * per_speed * quad.reach.abs() * speed;
+            // As `Extensions::drag_per_speed`.
+            let ratio = Lanes::splat(1.0 / DRAG_SPEED) * speed.abs();
+            let mut per_speed = linear + ratio * (quadratic + ratio * cubic);
+            if coefficient != 0.0 {
+                per_speed += Lanes::splat(coefficient) * ratio.at_least(LEAST_DRAG_RATIO).powf(power - 1.0);
+            }
+            let part = Lanes::splat(weight) * whole * per_speed * speed;
             force += part;
             moment += part * arm;
         }

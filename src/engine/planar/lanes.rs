@@ -63,6 +63,18 @@ impl Lanes {
         Self(from_fn(|i| self.0[i] / divisor.0[i]))
     }
 
+    /// Powers of positive numbers, to some units in the last place.
+    #[inline(always)]
+    pub(super) fn powf(self, power: f64) -> Self {
+        Self(f64x4::new(self.0).powf_simd(f64x4::splat(power)).to_array())
+    }
+
+    /// The larger of each lane and `least`.
+    #[inline(always)]
+    pub(super) fn at_least(self, least: f64) -> Self {
+        self.map(|value| value.max(least))
+    }
+
     /// Hyperbolic tangents, to some units in the last place of 1.
     #[inline(always)]
     pub(super) fn tanh(self) -> Self {
