@@ -1,5 +1,5 @@
 //! Faults of the bench: a clock offset and rate, a gain of the inputs, a scale of the signals, and a zero and a linear drift of each channel, run by
-//! run; and the times of an input's jumps between two rows, as shares of the interval.
+//! run.
 //!
 //! They are nuisance parameters u of a run with normal priors, u ~ N(0, S), and enter its residuals r (σ) linearly through the columns G (values ×
 //! faults, σ per unit of u). They are eliminated from every prediction by generalised least squares (variable projection):
@@ -10,7 +10,6 @@
 //!
 //! The standard deviations S are given in `[bench]`, or those of largest restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) of
 //! faults about means that are free: what is common to all runs is left for the causes to explain, except for the clock's rate, which no cause is.
-//! The share of a jump's time has the mean and the standard deviation of a uniform distribution from 0 to 1.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,9 +20,6 @@ const LEAST_SHARE: f64 = 0.1;
 /// Trial standard deviations of a fault: from the error with which a run determines it, in this ratio, this many.
 const RATIO: f64 = 1.333_521_432_163_324; // 10^(1/8)
 const TRIALS: usize = 40;
-/// Mean and standard deviation of the share of an interval at which an input jumps.
-const MEAN_SHARE: f64 = 0.5;
-const SHARE_SD: f64 = 0.288_675_134_594_812_9; // 1/√12
 /// Most passes over all faults.
 const MOST_PASSES: usize = 6;
 
@@ -64,7 +60,7 @@ impl Spread {
         std::array::from_fn(|kind| if self.of[kind] > 0.0 { base[kind] } else { 0.0 })
     }
 
-    /// Standard deviation of every column of a run of a number of `channels` but those of jumps.
+    /// Standard deviation of every column of a run of a number of `channels`.
     fn columns(&self, channels: usize) -> Vec<f64> {
         (0..SHARED + 2 * channels).map(|column| self.of[kind(column, channels)]).collect()
     }
@@ -92,9 +88,8 @@ pub struct Columns {
     gram: DMatrix<f64>,
     /// Number of channels.
     channels: usize,
-    /// Base values at which residuals are computed, of faults and of the jumps' shares.
+    /// Base values at which residuals are computed.
     base: [f64; BASED],
-    shares: Vec<f64>,
 }
 
 /// A fault of a run.
@@ -111,9 +106,9 @@ pub struct Fault {
 }
 
 /// What a run contributes to the likelihood of the faults.
-pub struct Moments {
-    /// GᵀG and Gᵀ r, the jumps eliminated.
-    gram: DMatrix<f64>,
+pub struct Moments<'a> {
+    gram: &'a DMatrix<f64>,
+    /// Gᵀ r.
     along: DVector<f64>,
     channels: usize,
     /// Number of values.
@@ -122,14 +117,13 @@ pub struct Moments {
 
 impl Columns {
     /// Columns of a run at base values: `predicted` values and their derivatives by time, `rate`, and by the gain; 1/σ of each value, 0 for those that do not
-    /// count; base values of the faults; the share of each jump with the derivatives by it; `whiten` replaces residuals (σ) by independent ones.
+    /// count; `whiten` replaces residuals (σ) by independent ones.
     pub fn new(
         channels: &[usize],
         times: &[f64],
         [predicted, rate, by_gain]: [&[f64]; 3],
         weights: &[f64],
         base: [f64; BASED],
-        jumps: &[(f64, Vec<f64>)],
         whiten: impl Fn(&mut [f64]),
     ) -> Self {
         let count = channels.iter().max().map_or(0, |last| last + 1);
@@ -146,18 +140,16 @@ impl Columns {
             columns[SHARED + channel][i] = *weight;
             columns[SHARED + count + channel][i] = weight * (times[i] - middle);
         }
-        let weighted = |by_share: &[f64]| by_share.iter().zip(weights).map(|(by_share, weight)| weight * by_share).collect();
-        columns.extend(jumps.iter().map(|(_, by_share)| weighted(by_share)));
         let plain = columns.clone();
         columns.iter_mut().for_each(|column| whiten(column));
         let q = columns.len();
         let gram = DMatrix::from_fn(q, q, |i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
-        Self { plain, columns, gram, channels: count, base, shares: jumps.iter().map(|(share, _)| *share).collect() }
+        Self { plain, columns, gram, channels: count, base }
     }
 
     /// Without the kinds for which `has` is false: their columns are zero.
     pub fn only(mut self, has: impl Fn(usize) -> bool) -> Self {
-        for column in (0..self.faults_count()).filter(|column| !has(kind(*column, self.channels))) {
+        for column in (0..self.columns.len()).filter(|column| !has(kind(*column, self.channels))) {
             self.plain[column].fill(0.0);
             self.columns[column].fill(0.0);
             self.gram.row_mut(column).fill(0.0);
@@ -166,81 +158,44 @@ impl Columns {
         self
     }
 
-    /// Number of columns before those of the jumps.
-    fn faults_count(&self) -> usize {
-        SHARED + 2 * self.channels
-    }
-
-    /// Standard deviation of every column.
-    fn sds(&self, spread: &Spread) -> Vec<f64> {
-        let mut sds = spread.columns(self.channels);
-        sds.resize(self.columns.len(), SHARE_SD);
-        sds
-    }
-
-    /// True if nothing is to be eliminated.
-    fn is_idle(&self, spread: &Spread) -> bool {
-        spread.is_off() && self.shares.is_empty()
-    }
-
-    /// Base values of all columns less the means of their priors.
-    fn base(&self, base: [f64; BASED]) -> Vec<f64> {
-        let mut all = base.to_vec();
-        all.resize(self.faults_count(), 0.0);
-        all.extend(self.shares.iter().map(|share| share - MEAN_SHARE));
-        all
-    }
-
-    /// Residuals at base values as those about the means of the priors, to first order.
-    fn about_means(&self, base: &[f64], residuals: &mut [f64]) {
+    /// Residuals at the base values `base` as those about 0, to first order.
+    fn about_zero(&self, base: [f64; BASED], residuals: &mut [f64]) {
         for (base, column) in base.iter().zip(&self.columns).filter(|(base, _)| **base != 0.0) {
             residuals.iter_mut().zip(column).for_each(|(r, g)| *r += base * g);
         }
     }
 
-    /// Estimates of all columns' parameters about the means of their priors, 0 for those that are off, and log det(I + S GᵀG). A jump that would leave its
-    /// interval is held at its end.
-    fn estimate(&self, sds: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
+    /// Estimates of all faults, 0 for those that are off, and their covariance factor S^(−½)(…)S^(−½) as log det(I + S GᵀG).
+    fn estimate(&self, spread: &Spread, along: &DVector<f64>) -> (Vec<f64>, f64) {
+        let sds = spread.columns(self.channels);
         let q = sds.len();
-        let along: Vec<f64> = (0..q).map(|k| if sds[k] > 0.0 { product(&self.columns[k], residuals) } else { 0.0 }).collect();
         // In units of the standard deviations: (I + D GᵀG D) v = D Gᵀ r, u = D v.
-        let whole = scaled(&self.gram, sds);
-        let mut held: Vec<Option<f64>> = vec![None; q];
-        let mut size = None;
-        loop {
-            let is_coupled = |i: usize, j: usize| i == j || (held[i].is_none() && held[j].is_none());
-            let matrix = DMatrix::from_fn(q, q, |i, j| if is_coupled(i, j) { whole[(i, j)] } else { 0.0 });
-            let Some(factor) = matrix.cholesky() else { return (vec![0.0; q], 0.0) };
-            let size = *size.get_or_insert_with(|| log_det(&factor));
-            let of_held = |k: usize| held.iter().enumerate().filter_map(|(j, u)| Some(self.gram[(k, j)] * (*u)?)).sum::<f64>();
-            let v = factor.solve(&DVector::from_fn(q, |k, _| sds[k] * (along[k] - of_held(k))));
-            let values: Vec<f64> = (0..q).map(|k| held[k].unwrap_or(sds[k] * v[k])).collect();
-            let beyond: Vec<usize> = (self.faults_count()..q).filter(|k| values[*k].abs() > MEAN_SHARE).collect();
-            if beyond.is_empty() {
-                return (values, size);
+        let right = DVector::from_fn(q, |i, _| sds[i] * along[i]);
+        match scaled(&self.gram, &sds).cholesky() {
+            Some(factor) => {
+                let v = factor.solve(&right);
+                (v.iter().zip(&sds).map(|(v, sd)| v * sd).collect(), log_det(&factor))
             }
-            beyond.into_iter().for_each(|k| held[k] = Some(values[k].clamp(-MEAN_SHARE, MEAN_SHARE)));
+            None => (vec![0.0; q], 0.0),
         }
     }
 
-    /// Estimates from residuals (σ) at the base values, about the means of the priors.
-    fn values(&self, spread: &Spread, residuals: &[f64]) -> Vec<f64> {
-        let mut residuals = residuals.to_vec();
-        self.about_means(&self.base(spread.keep(self.base)), &mut residuals);
-        self.estimate(&self.sds(spread), &residuals).0
+    fn along(&self, residuals: &[f64]) -> DVector<f64> {
+        DVector::from_fn(self.columns.len(), |k, _| self.columns[k].iter().zip(residuals).map(|(g, r)| g * r).sum())
     }
 
-    /// The faults of a run with the given residuals (σ), clock offset (s), rate and gain first, and the shares of its jumps.
-    pub fn faults(&self, spread: &Spread, residuals: &[f64]) -> ([f64; BASED], Vec<f64>) {
-        let values = self.values(spread, residuals);
-        let shares = values[self.faults_count()..].iter().map(|value| MEAN_SHARE + value);
-        (std::array::from_fn(|kind| values[kind]), shares.collect())
+    /// The faults of a run with the given residuals (σ): the clock offset (s), the gain, zeros and drifts.
+    pub fn faults(&self, spread: &Spread, residuals: &[f64]) -> Vec<f64> {
+        let mut residuals = residuals.to_vec();
+        self.about_zero(spread.keep(self.base), &mut residuals);
+        self.estimate(spread, &self.along(&residuals)).0
     }
 
     /// The faults of a run that are not off, with their posterior standard deviations.
     pub fn found(&self, spread: &Spread, residuals: &[f64]) -> Vec<Fault> {
-        let values = self.values(spread, residuals);
-        let sds = self.sds(spread);
+        let values = self.faults(spread, residuals);
+        let sds = spread.columns(self.channels);
+        let q = sds.len();
         let inverse = scaled(&self.gram, &sds).cholesky().map(|factor| factor.inverse());
         let of = |column: usize| Fault {
             kind: kind(column, self.channels),
@@ -248,62 +203,43 @@ impl Columns {
             value: values[column],
             sd: inverse.as_ref().map_or(f64::NAN, |inverse| sds[column] * inverse[(column, column)].sqrt()),
         };
-        (0..self.faults_count()).filter(|column| sds[*column] > 0.0).map(of).collect()
+        (0..q).filter(|column| sds[*column] > 0.0).map(of).collect()
     }
 
-    /// Eliminates faults and jumps from residuals (σ): appends (û − mean)/s, one value for each column, and returns log det(I + S GᵀG).
+    /// Eliminates the faults from residuals (σ): appends û/s, one value for each fault, and returns log det(I + S GᵀG).
     pub fn eliminate(&self, spread: &Spread, residuals: &mut Vec<f64>) -> f64 {
-        if self.is_idle(spread) {
+        if spread.is_off() {
             residuals.resize(residuals.len() + self.columns.len(), 0.0);
             return 0.0;
         }
-        self.about_means(&self.base(spread.keep(self.base)), residuals);
-        let sds = self.sds(spread);
-        let (values, log_det) = self.estimate(&sds, residuals);
-        for (value, column) in values.iter().zip(&self.columns).filter(|(value, _)| **value != 0.0) {
-            residuals.iter_mut().zip(column).for_each(|(r, g)| *r -= value * g);
+        self.about_zero(spread.keep(self.base), residuals);
+        let (faults, log_det) = self.estimate(spread, &self.along(residuals));
+        for (fault, column) in faults.iter().zip(&self.columns).filter(|(fault, _)| **fault != 0.0) {
+            residuals.iter_mut().zip(column).for_each(|(r, g)| *r -= fault * g);
         }
-        residuals.extend(values.iter().zip(sds).map(|(value, sd)| if sd > 0.0 { value / sd } else { 0.0 }));
+        let sds = spread.columns(self.channels);
+        residuals.extend(faults.iter().zip(sds).map(|(fault, sd)| if sd > 0.0 { fault / sd } else { 0.0 }));
         log_det
     }
 
-    /// Takes the faults that `whitened` residuals show from `plain` ones (both in σ). Jumps stay at their base values, where they can be simulated.
+    /// Takes the faults that `whitened` residuals show from `plain` ones (both in σ).
     pub fn take_from(&self, spread: &Spread, whitened: &[f64], plain: &mut [f64]) {
         if spread.is_off() {
             return;
         }
-        let changes = self.values(spread, whitened).into_iter().zip(self.base(spread.keep(self.base)));
-        for ((value, base), column) in changes.zip(&self.plain).take(self.faults_count()).filter(|((u, base), _)| u != base) {
-            plain.iter_mut().zip(column).for_each(|(r, g)| *r -= (value - base) * g);
+        let mut faults = self.faults(spread, whitened);
+        faults.iter_mut().zip(spread.keep(self.base)).for_each(|(fault, base)| *fault -= base);
+        for (fault, column) in faults.iter().zip(&self.plain).filter(|(fault, _)| **fault != 0.0) {
+            plain.iter_mut().zip(column).for_each(|(r, g)| *r -= fault * g);
         }
     }
 
     /// What the run, with the given residuals (σ), contributes to the likelihood.
-    pub fn moments(&self, residuals: &[f64]) -> Moments {
+    pub fn moments(&self, residuals: &[f64]) -> Moments<'_> {
         let mut residuals = residuals.to_vec();
-        self.about_means(&self.base(self.base), &mut residuals);
-        let along = DVector::from_fn(self.columns.len(), |k, _| product(&self.columns[k], &residuals));
-        let (own, jumps) = (self.faults_count(), self.shares.len());
-        let mut moments = Moments {
-            gram: self.gram.view((0, 0), (own, own)).into_owned(),
-            along: along.rows(0, own).into_owned(),
-            channels: self.channels,
-            count: residuals.len(),
-        };
-        let of_jumps = self.gram.view((own, own), (jumps, jumps)).into_owned();
-        if let Some(factor) = scaled(&of_jumps, &vec![SHARE_SD; jumps]).cholesky() {
-            let across = SHARE_SD * self.gram.view((own, 0), (jumps, own));
-            let eliminated = factor.solve(&across).transpose();
-            moments.gram -= &eliminated * &across;
-            moments.along -= eliminated * (SHARE_SD * along.rows(own, jumps));
-        }
-        moments
+        self.about_zero(self.base, &mut residuals);
+        Moments { gram: &self.gram, along: self.along(&residuals), channels: self.channels, count: residuals.len() }
     }
-}
-
-/// Inner product over the values of a column.
-fn product(column: &[f64], residuals: &[f64]) -> f64 {
-    column.iter().zip(residuals).map(|(g, r)| g * r).sum()
 }
 
 /// I + D GᵀG D, with the standard deviations D on its diagonal.
@@ -321,13 +257,13 @@ fn cost(runs: &[Moments], spread: &Spread) -> f64 {
     let (mut sum, mut information, mut right) = (0.0, DMatrix::zeros(q, q), DVector::zeros(q));
     for run in runs.iter().filter(|run| run.along.len() == q) {
         let sds = spread.columns(run.channels);
-        let Some(factor) = scaled(&run.gram, &sds).cholesky() else { return f64::INFINITY };
+        let Some(factor) = scaled(run.gram, &sds).cholesky() else { return f64::INFINITY };
         let d = DMatrix::from_diagonal(&DVector::from_vec(sds));
         let v = factor.solve(&(&d * &run.along));
         sum += log_det(&factor) - v.dot(&(&d * &run.along));
         // GᵀWG and GᵀWr with W = (I + G S Gᵀ)⁻¹.
-        information += &run.gram - &run.gram * &d * factor.solve(&(&d * &run.gram));
-        right += &run.along - &run.gram * &d * v;
+        information += run.gram - run.gram * &d * factor.solve(&(&d * run.gram));
+        right += &run.along - run.gram * &d * v;
     }
     // Columns that no run determines have no mean, and the clock's rate has none by itself.
     let scale = DVector::from_fn(q, |k, _| {
@@ -419,10 +355,6 @@ mod tests {
     }
 
     fn columns(hertz: f64) -> Columns {
-        columns_with(hertz, &[])
-    }
-
-    fn columns_with(hertz: f64, jumps: &[(f64, Vec<f64>)]) -> Columns {
         let (signal, predicted, rate) = run(hertz);
         // As of a sheet that bends: its end moves back with the square of the voltage.
         let by_gain: Vec<f64> = predicted.iter().zip(&signal.channels).map(|(f, c)| if *c == 0 { 2.0 * f } else { *f }).collect();
@@ -432,86 +364,30 @@ mod tests {
             [&predicted, &rate, &by_gain],
             &vec![1.0 / SIGMA; 1000],
             [0.0; BASED],
-            jumps,
             |_| {},
         )
     }
 
-    /// Two jumps whose responses decay.
-    fn jumps(shares: [f64; 2]) -> [(f64, Vec<f64>); 2] {
-        let (signal, ..) = run(3.0);
-        let decay = |from: f64| signal.times.iter().map(|t| if *t > from { (from - t).exp() } else { 0.0 }).collect();
-        [(shares[0], decay(0.2)), (shares[1], decay(0.5))]
-    }
-
-    /// χ² and log det by the covariance I + G S Gᵀ itself.
-    fn direct(own: &Columns, spread: &Spread, r: &[f64]) -> [f64; 2] {
-        let sds = own.sds(spread);
+    #[test]
+    fn eliminated_residuals_have_the_generalised_least_squares_cost() {
+        let own = columns(3.0);
+        let spread = Spread { of: [2e-3, 0.0, 0.01, 0.0, 0.1, 0.0] };
+        let mut random = Random::new(1);
+        let r: Vec<f64> = (0..1000).map(|_| random.normal()).collect();
+        let mut eliminated = r.clone();
+        let log_det = own.eliminate(&spread, &mut eliminated);
+        // The covariance I + G S Gᵀ itself.
+        let sds = spread.columns(2);
         let covariance = DMatrix::from_fn(1000, 1000, |i, j| {
             let along: f64 = (0..sds.len()).map(|k| sds[k].powi(2) * own.columns[k][i] * own.columns[k][j]).sum();
             along + f64::from(u8::from(i == j))
         });
         let factor = covariance.cholesky().unwrap();
-        let vector = DVector::from_column_slice(r);
-        [vector.dot(&factor.solve(&vector)), super::log_det(&factor)]
-    }
-
-    #[test]
-    fn eliminated_residuals_have_the_generalised_least_squares_cost() {
-        let spread = Spread { of: [2e-3, 0.0, 0.01, 0.0, 0.1, 0.0] };
-        let mut random = Random::new(1);
-        let r: Vec<f64> = (0..1000).map(|_| random.normal()).collect();
-        for own in [columns(3.0), columns_with(3.0, &jumps([MEAN_SHARE; 2]))] {
-            let mut eliminated = r.clone();
-            let log_det = own.eliminate(&spread, &mut eliminated);
-            let [chi2, size] = direct(&own, &spread, &r);
-            assert!((product(&eliminated, &eliminated) / chi2 - 1.0).abs() < 1e-9, "{chi2}");
-            assert!((log_det / size - 1.0).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn the_likelihood_of_faults_is_that_with_the_jumps_eliminated() {
-        let own = columns_with(3.0, &jumps([MEAN_SHARE; 2]));
-        let spread = Spread { of: [2e-3, 0.0, 0.01, 0.0, 0.1, 0.0] };
-        let mut random = Random::new(2);
-        let r: Vec<f64> = (0..1000).map(|_| random.normal()).collect();
-        let [[with, size_with], [without, size_without]] = [spread, Spread::default()].map(|spread| direct(&own, &spread, &r));
-        let Moments { gram, along, .. } = own.moments(&r);
-        let sds = spread.columns(2);
-        let factor = scaled(&gram, &sds).cholesky().unwrap();
-        let right = DVector::from_fn(sds.len(), |k, _| sds[k] * along[k]);
-        assert!((with - without + right.dot(&factor.solve(&right))).abs() < 1e-6 * without);
-        assert!((size_with - size_without - log_det(&factor)).abs() < 1e-9 * size_with);
-    }
-
-    #[test]
-    fn a_jump_between_two_rows_is_found_wherever_its_columns_were_taken() {
-        // Truth: shares of 0.3 and 0.8; columns of what was predicted for others.
-        for base in [[0.5; 2], [1.0; 2], [0.1, 0.6]] {
-            let own = columns_with(3.0, &jumps(base));
-            let mut r = vec![0.0; 1000];
-            for (column, by) in own.columns[own.faults_count()..].iter().zip([0.3 - base[0], 0.8 - base[1]]) {
-                r.iter_mut().zip(column).for_each(|(r, g)| *r += by * g);
-            }
-            let (_, shares) = own.faults(&Spread::default(), &r);
-            // The prior draws to the middle by its share of what the values tell.
-            assert!((shares[0] - 0.3).abs() < 1e-3 && (shares[1] - 0.8).abs() < 1e-3, "{shares:?}");
-        }
-    }
-
-    #[test]
-    fn a_jump_stays_in_its_interval_and_leaves_the_others_as_they_are() {
-        let own = columns_with(3.0, &jumps([0.5; 2]));
-        let mut r = vec![0.0; 1000];
-        for (column, by) in own.columns[own.faults_count()..].iter().zip([0.9, -0.2]) {
-            r.iter_mut().zip(column).for_each(|(r, g)| *r += by * g);
-        }
-        let (_, shares) = own.faults(&Spread::default(), &r);
-        // What the first cannot take, 0.4 of its column, the second one takes by the overlap of the two.
-        let [first, second] = [0, 1].map(|k| &own.columns[own.faults_count() + k]);
-        let expected = 0.3 + 0.4 * product(first, second) / product(second, second);
-        assert!(shares[0] == 1.0 && (shares[1] - expected.min(1.0)).abs() < 1e-3, "{shares:?}, {expected}");
+        let vector = DVector::from_vec(r);
+        let direct = vector.dot(&factor.solve(&vector));
+        let chi2: f64 = eliminated.iter().map(|r| r * r).sum();
+        assert!((chi2 / direct - 1.0).abs() < 1e-9, "{chi2} {direct}");
+        assert!((log_det / super::log_det(&factor) - 1.0).abs() < 1e-9);
     }
 
     /// Eleven runs with faults of the given standard deviations, and `common` to all; −2 log likelihood decides.

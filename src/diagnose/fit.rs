@@ -535,19 +535,18 @@ impl<'a> Estimator<'a> {
         (self.nuisances, self.used, self.faults, self.noise) = (nuisances, used, faults, noise);
     }
 
-    /// Sets the base values of each run's faults and jumps to their estimates under `model`, and their columns to the model's predictions there.
+    /// Sets the base values of each run's faults to their estimates under `model`, and their columns to the model's predictions there.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn set_faults(&mut self, model: &Model) -> Result<(), DiagnoseError> {
-        // Halves of central differences, in s and in the gain, and the step of a jump's share.
+        // Halves of central differences, in s and in the gain.
         const HALF_STEP: f64 = 1e-4;
         const HALF_GAIN: f64 = 5e-3;
-        const SHARE_STEP: f64 = 0.05;
         let plant = self.plant;
         for (run, faults) in self.faults_of(model)?.into_iter().enumerate() {
             let nuisance = &mut self.nuisances[run];
-            (nuisance.base, nuisance.shares) = faults;
+            nuisance.base = faults.first_chunk().copied().unwrap_or_default();
             // The inputs beyond the last row are not known.
             let signal = &plant.signals()[run];
             let end = signal.times.iter().copied().fold(0.0, f64::max);
@@ -570,20 +569,11 @@ impl<'a> Estimator<'a> {
             let has_clock = [Spread::CLOCK, Spread::RATE].into_iter().any(|kind| plant.has_fault(run, kind));
             let rate = if has_clock { derivative(Spread::CLOCK, HALF_STEP)? } else { vec![0.0; now.len()] };
             let by_gain = derivative(Spread::GAIN, HALF_GAIN)?;
-            let by_share = |jump: usize| -> Result<(f64, Vec<f64>), DiagnoseError> {
-                let share = nuisance.shares[jump];
-                let by = if share > 0.5 { -SHARE_STEP } else { SHARE_STEP };
-                let mut moved = nuisance.clone();
-                moved.shares[jump] += by;
-                let moved = self.predict(model, run, &moved)?;
-                Ok((share, moved.iter().zip(&*now).map(|(b, a)| (b - a) / by).collect()))
-            };
-            let jumps: Vec<_> = (0..nuisance.shares.len()).into_par_iter().map(by_share).collect::<Result<_, _>>()?;
             let weights: Vec<f64> =
                 signal.sigmas.iter().zip(&self.used[run]).map(|(sigma, used)| if *used { 1.0 / sigma } else { 0.0 }).collect();
             let whiten = |column: &mut [f64]| self.noise.whiten(signal, &self.used[run], column);
-            let derivatives = [&now[..], &rate, &by_gain];
-            let columns = Columns::new(&signal.channels, &signal.times, derivatives, &weights, nuisance.base, &jumps, whiten);
+            let columns =
+                Columns::new(&signal.channels, &signal.times, [&now[..], &rate, &by_gain], &weights, nuisance.base, whiten);
             Ok(columns.only(|kind| plant.has_fault(run, kind)))
         };
         let columns: Vec<Columns> = (0..plant.signals().len()).into_par_iter().map(columns).collect::<Result<_, _>>()?;
@@ -591,12 +581,14 @@ impl<'a> Estimator<'a> {
         Ok(())
     }
 
-    /// Clock offset (s), rate and gain of every run under `model`, and the shares of its jumps; the present ones before
-    /// [`set_faults`](Self::set_faults).
-    fn faults_of(&self, model: &Model) -> Result<Vec<([f64; bench::BASED], Vec<f64>)>, DiagnoseError> {
+    /// The bench's faults of every run under `model`: clock offset (s), gain, zeros and drifts; empty before [`set_faults`](Self::set_faults).
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn faults_of(&self, model: &Model) -> Result<Vec<Vec<f64>>, DiagnoseError> {
         let of = |run: usize| match self.faults.get(run) {
             Some(columns) => Ok(columns.faults(&model.spread, &self.misfit(model, run, &self.nuisance(model, run))?)),
-            None => Ok((self.nuisances[run].base, self.nuisances[run].shares.clone())),
+            None => Ok(Vec::new()),
         };
         (0..self.plant.signals().len()).into_par_iter().map(of).collect()
     }
@@ -661,6 +653,70 @@ impl<'a> Estimator<'a> {
             }
         }
         Ok(count)
+    }
+
+    /// Fits the shares of each run, with the model held.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub fn fit_nuisances(&mut self, model: &Model, runs: &[usize]) -> Result<(), DiagnoseError> {
+        const STEP: f64 = 0.05;
+        for &run in runs {
+            for _ in 0..3 {
+                let nuisance = self.nuisance(model, run);
+                let with = |shares: Vec<f64>| self.residuals_with(model, run, &Nuisance { shares, ..nuisance.clone() });
+                let shares = nuisance.shares.clone();
+                if shares.is_empty() {
+                    break;
+                }
+                let shifted = |k: usize| {
+                    let step = if shares[k] > 0.5 { -STEP } else { STEP };
+                    let mut shifted = shares.clone();
+                    shifted[k] += step;
+                    (shifted, step)
+                };
+                let plain = self.residuals(model, run)?;
+                let columns: Vec<Residuals> = (0..shares.len())
+                    .into_par_iter()
+                    .map(|k| {
+                        let (moved, step) = shifted(k);
+                        let r = with(moved)?;
+                        Ok(r.iter().zip(&plain).map(|(a, b)| (a - b) / step).collect())
+                    })
+                    .collect::<Result<_, DiagnoseError>>()?;
+                let n = shares.len();
+                let gradient: Vec<f64> = columns.iter().map(|column| inner(column, &plain)).collect();
+                let held: Vec<bool> =
+                    (0..n).map(|k| (shares[k] >= 1.0 && gradient[k] < 0.0) || (shares[k] <= 0.0 && gradient[k] > 0.0)).collect();
+                let matrix = DMatrix::from_fn(n, n, |i, j| {
+                    if i == j {
+                        1e-9 + inner(&columns[i], &columns[i])
+                    } else if held[i] || held[j] {
+                        0.0
+                    } else {
+                        inner(&columns[i], &columns[j])
+                    }
+                });
+                let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
+                let Some(step) = matrix.lu().solve(&right) else { break };
+                let before = sum_of_squares(&plain);
+                let mut better = None;
+                for part in [1.0, 0.3, 0.1] {
+                    let trial: Vec<f64> = shares.iter().zip(step.iter()).map(|(x, by)| (x + part * by).clamp(0.0, 1.0)).collect();
+                    let chi2 = sum_of_squares(&with(trial.clone())?);
+                    if chi2 < before {
+                        better = Some((trial, chi2));
+                        break;
+                    }
+                }
+                let Some((trial, chi2)) = better else { break };
+                self.nuisances[run].shares = trial;
+                if before - chi2 < 1.0 {
+                    break;
+                }
+            }
+        }
+        Ok(())
     }
 }
 

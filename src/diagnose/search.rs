@@ -306,6 +306,7 @@ impl Search<'_> {
         for _ in 0..MOST_TURNS {
             let before = scored.total();
             self.estimator.set_faults(scored.model())?;
+            self.estimator.fit_nuisances(scored.model(), &all)?;
             scored = self.fitted(scored.model())?;
             if before - scored.total()
                 < 1e-3 * (before - self.estimator.count(&all) as f64).max(self.estimator.count(&all) as f64)
