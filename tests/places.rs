@@ -75,9 +75,12 @@ impl Bent {
     }
 }
 
-fn candidates() -> Vec<Candidate> {
-    let free = |name, off, bounds, scale| Free { name, unit: "", off, bounds, scale, inverse: false };
-    let candidate = |id, place, parameters, starts| Candidate {
+fn free(name: &'static str, off: Option<f64>, bounds: [f64; 2], scale: f64) -> Free {
+    Free { name, unit: "", off, bounds, scale, inverse: false }
+}
+
+fn candidate(id: &'static str, place: &'static str, parameters: Vec<Free>, starts: Vec<Vec<f64>>) -> Candidate {
+    Candidate {
         id,
         kind: "test",
         cause: "A cause.",
@@ -88,7 +91,16 @@ fn candidates() -> Vec<Candidate> {
         parameters,
         fixed: Vec::new(),
         starts,
-    };
+    }
+}
+
+/// Two causes that with equal factors are a power of 3.
+fn halves() -> [Candidate; 2] {
+    let half = |id, place| candidate(id, place, vec![free("factor", Some(0.0), [-2.0, 2.0], 0.1)], vec![vec![0.1]]);
+    [half("cube-above", "above"), half("cube-below", "below")]
+}
+
+fn candidates() -> Vec<Candidate> {
     let weight = |name| free(name, Some(0.0), [-2.0, 2.0], 0.05);
     let unit = |k: usize| (0..5).map(|at| if at == k { 0.1 } else { 0.0 }).collect::<Vec<f64>>();
     vec![
@@ -144,7 +156,9 @@ impl Plant for Bent {
         let bent = |u: f64| {
             let power = of("power").map_or(0.0, |x| x[0] * u.signum() * u.abs().powf(x.get(1).copied().unwrap_or(3.0)));
             let polarity = of("polarity").map_or(0.0, |x| x[0] * u.max(0.0));
-            u + power + polarity + of("free-curve").map_or(0.0, |weights| hats(weights, u))
+            let of_half = |id: &str, half: f64| of(id).map_or(0.0, |x| x[0] * half.powi(3));
+            let halves = of_half("cube-above", u.max(0.0)) + of_half("cube-below", u.min(0.0));
+            u + power + polarity + halves + of("free-curve").map_or(0.0, |weights| hats(weights, u))
         };
         let parts = if model.fine { 8 } else { 4 };
         let h = STEP / f64::from(parts);
@@ -161,8 +175,11 @@ impl Plant for Bent {
 }
 
 fn diagnosed(curve: impl Fn(f64) -> f64, lag: f64, seed: u64) -> Diagnosis {
-    let plant = Bent::new(&curve, lag, seed);
-    diagnose(&plant, "bent", &[], Vec::new(), &|_| {}, &|_| None).unwrap().diagnosis
+    of_plant(&Bent::new(&curve, lag, seed))
+}
+
+fn of_plant(plant: &Bent) -> Diagnosis {
+    diagnose(plant, "bent", &[], Vec::new(), &|_| {}, &|_| None).unwrap().diagnosis
 }
 
 fn causes(d: &Diagnosis) -> Vec<&str> {
@@ -245,5 +262,17 @@ fn a_constant_and_a_law_are_told_apart() {
         let mut found = causes(&d);
         found.sort_unstable();
         assert_eq!((d.verdict, found), (Verdict::Named, vec!["lag", "power"]), "{seed}: {}", d.summary);
+    }
+}
+
+#[test]
+fn two_causes_that_do_what_one_does_are_tied_with_it_as_a_set() {
+    for seed in 1..=3 {
+        let mut plant = Bent::new(&|u| 0.2 * u * u * u, LAG, seed);
+        plant.candidates.extend(halves());
+        let d = of_plant(&plant);
+        assert_eq!((d.verdict, causes(&d)), (Verdict::Tied, vec!["power"]), "{seed}: {}", d.summary);
+        assert_eq!(d.effects[0].tied_with, ["cube-above+cube-below"]);
+        assert!(d.summary.contains("cube above") && d.summary.contains("cube below"), "{}", d.summary);
     }
 }

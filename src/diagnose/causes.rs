@@ -2,6 +2,7 @@
 
 use super::DiagnoseError;
 use super::diagnosis::Nearest;
+use super::fit::Convergence;
 use super::naming::{self, Naming};
 use super::plant::Model;
 use super::search::{SOUGHT, Scored, Search, Trial};
@@ -78,7 +79,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
 
     (search.progress)("the final refit");
     let mut best = search.fitted(&Model { fine: true, ..causes.best.model().clone() })?;
-    best = search.resolve(best);
+    best = search.resolve(best, Convergence::Full);
     best = search.backward(best)?;
     causes.best = search.settle(best)?;
     Ok(causes)
@@ -128,9 +129,9 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     if spikes > 0 {
         best = search.settle(best)?;
     }
-    best = search.resolve(best);
+    best = search.resolve(best, Convergence::Rank);
     best = search.backward(best)?;
-    best = search.resolve(best);
+    best = search.resolve(best, Convergence::Rank);
     let share_left = search.share_left(&best);
     // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
     if share_left > SOUGHT && search.estimator.held_spread.take().is_some() {

@@ -171,11 +171,16 @@ impl<'a> Place<'a> {
         (of(&self.bare) - of(scored)) / (of(&self.bare) - of(&self.best)).max(f64::MIN_POSITIVE)
     }
 
-    /// A model whose last term is the name; none if it cannot be fitted.
+    /// A model whose last term is the name, the other causes with their plain laws if these do; none if it cannot be fitted.
+    ///
+    /// What a free form misses of the true curve can make another law of another cause significant, which then stands in the way of the right name.
     fn attempt(&self, model: &Model) -> Option<Attempt> {
         let name = self.search.candidate(model.terms.last()?).id;
         (self.search.progress)(&format!("{name} in the stead of {}", self.search.candidate(&self.free).id));
-        let scored = self.search.fitted_at_its_spread(model).ok()?;
+        let mut scored = self.search.fitted_at_its_spread(model).ok()?;
+        for index in 0..scored.model().terms.len() - 1 {
+            scored = self.search.with_its_plain_law(scored, index).ok()?;
+        }
         Some(Attempt { name, taken: self.taken(&scored), scored })
     }
 

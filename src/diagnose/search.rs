@@ -341,9 +341,12 @@ impl Search<'_> {
     /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
-        let (_, gain) = self.gap(more, less, runs);
-        let count = self.estimator.count(runs) as f64;
-        gain > count * LEAST_GAIN.max(LEAST_SHARE * self.unexplained) && self.is_significant(more, less)
+        self.gap(more, less, runs).1 > self.worth(runs) && self.is_significant(more, less)
+    }
+
+    /// The least fall of χ² of `runs` for which a cause is adopted.
+    fn worth(&self, runs: &[usize]) -> f64 {
+        self.estimator.count(runs) as f64 * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
     }
 
     /// True if a free form is better than a name on the select runs and by BIC.
@@ -651,7 +654,7 @@ impl Search<'_> {
             };
             // The discretisation and the laws are refined before another cause could take their errors.
             let settled = self.settle(worthy)?;
-            best = self.resolve(settled);
+            best = self.resolve(settled, Convergence::Rank);
             for index in 0..best.model().terms.len() {
                 best = self.with_its_law(best, index)?;
             }
@@ -665,17 +668,20 @@ impl Search<'_> {
         Ok((best, first.unwrap_or_default()))
     }
 
-    /// The model with another law of the cause of term `index`, if that is significantly better.
+    /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
     ///
     /// # Errors
     /// [`DiagnoseError`] if a better law cannot be fitted to the end.
     fn with_its_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
+        if own.is_variant {
+            return self.with_its_plain_law(scored, index);
+        }
         let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
         for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
-            if variant.id != own.id || !variant.is_variant || own.is_variant {
+            if variant.id != own.id || !variant.is_variant {
                 continue;
             }
             let mut tried: Vec<Vec<f64>> = Vec::new();
@@ -698,6 +704,30 @@ impl Search<'_> {
         let Some(best) = best else { return Ok(scored) };
         let best = self.fitted(best.model())?;
         Ok(if self.is_significant(&best, &scored) { best } else { scored })
+    }
+
+    /// The model with the plain law of the cause of term `index`, unless its own law is significantly better.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the plain law cannot be fitted.
+    pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
+        let term = &scored.model().terms[index];
+        let own = self.candidate(term);
+        if !own.is_variant {
+            return Ok(scored);
+        }
+        let of_plain = |candidate: usize| {
+            let plain = &self.estimator.plant.candidates()[candidate];
+            let at = |free: &Free| own.parameters.iter().position(|p| p.name == free.name).map(|at| term.x[at]);
+            let x = plain.parameters.iter().map(at).collect::<Option<Vec<f64>>>()?;
+            (plain.id == own.id && !plain.is_variant).then_some(Term { candidate, x })
+        };
+        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return Ok(scored) };
+        (self.progress)(&format!("the plain law of {}", own.id));
+        let mut model = scored.model().clone();
+        model.terms[index] = plain;
+        let plain = self.fitted_at_its_spread(&model)?;
+        Ok(if self.is_significant(&scored, &plain) { scored } else { plain })
     }
 
     /// Sets what re-tuned constants leave to what `constants` leaves.
@@ -895,8 +925,13 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// The discretisation with the least χ² over all runs, by steps from the present one.
-    pub fn resolve(&self, best: Scored) -> Scored {
+    /// The discretisation with the least χ² over all runs, by steps from the present one. To rank models, steps end where they lower χ² by less than half
+    /// of what a cause would have to: finer models cost more, and the error that is left is adopted as no cause.
+    pub fn resolve(&self, best: Scored, convergence: Convergence) -> Scored {
+        let least = match convergence {
+            Convergence::Rank => 0.5 * self.worth(&self.split.all()),
+            Convergence::Full => 0.0,
+        };
         let resolutions = self.estimator.plant.resolutions();
         let mut best = best;
         let mut tried = vec![best.model().resolution];
@@ -909,7 +944,7 @@ impl Search<'_> {
                 (self.progress)(&format!("{resolution} joints per actuator"));
                 // A discretisation in which the model diverges is none for it.
                 let Ok(other) = self.fitted(&Model { resolution, ..best.model().clone() }) else { continue };
-                if other.total() < best.total() {
+                if other.total() < best.total() - least {
                     best = other;
                     moved = true;
                     break;

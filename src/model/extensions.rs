@@ -206,7 +206,7 @@ pub const DRAG_POWERS: [i32; 3] = [1, 2, 3];
 /// Speed at which the parts of drag have their coefficients (cm/s).
 pub const DRAG_SPEED: f64 = 100.0;
 /// Below this share of [`DRAG_SPEED`] drag of any power is viscous: powers below 1 have no slope at rest.
-const LEAST_DRAG_RATIO: f64 = 1e-4;
+pub(crate) const LEAST_DRAG_RATIO: f64 = 1e-4;
 /// Density of air (g/cm³).
 pub const AIR_DENSITY: f64 = 1.2e-3;
 

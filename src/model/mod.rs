@@ -22,9 +22,10 @@ pub mod units;
 
 pub use clamp::{CLAMP_POINTS, ClampCurve};
 pub use curve::{CURVE_POINTS, Curve};
+pub(crate) use extensions::LEAST_DRAG_RATIO;
 pub use extensions::{
     AIR_DENSITY, ATTACHMENT_RATE, Attachment, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS,
-    LOSS_TIMES, PointMass, Slip, StickSlip, VISCOUS_REACH,
+    LOSS_TIMES, PointMass, SOFTENING_CURVATURE, Slip, StickSlip, VISCOUS_REACH,
 };
 pub use friction::{FRICTION_POINTS, FrictionCurve};
 pub use laminate::{Laminate, Material};

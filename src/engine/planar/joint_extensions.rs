@@ -3,8 +3,9 @@
 //!
 //! The step stays one problem that is linear in the mean rates u: a joint's extra torque e is put as e* − s (u − u*), about the rate u* of the
 //! step before. For softening, curves and springs with a limit s is the tangent, which errs by the square of what changes in a step. For dry friction,
-//! τ_c tanh(u/ω), the step is repeated with the new u until nothing changes: with the tangent where a joint slides fast and goes on in its direction (Newton), otherwise
-//! with the secant −e*/u*, whose quadratic potential majorises that of friction, so that a repetition can only lower the cost. The Prony chain is linear and
+//! τ_c tanh(u/ω), the step is repeated with the new u until nothing changes: with the tangent at u (Newton), or at rest where u has changed its sign, since
+//! from there Newton's method goes up to the solution without passing it. Where joints hinder each other in that, after [`NEWTON`] repetitions, the secant
+//! −e*/u* takes over, whose quadratic potential majorises that of friction, so that a repetition can only lower the cost. The Prony chain is linear and
 //! exact over a step.
 
 use wide::f64x2;
@@ -12,12 +13,14 @@ use wide::f64x2;
 use super::lanes::Lanes;
 use super::quad::Quad;
 use crate::engine::GAUSS;
-use crate::model::{DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS, LOSS_TIMES};
+use crate::model::{
+    AIR_DENSITY, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_DRAG_RATIO, LEAST_STIFFNESS, LOSS_TIMES, SOFTENING_CURVATURE,
+};
 
 /// Repetitions end when no friction torque changes by more than this fraction of its moment; after `LARGEST_REPETITIONS` they fail.
 const FRICTION_ENOUGH: f64 = 1e-3;
-/// A joint slides fast at this multiple of the rate at which friction has 76 % of its moment.
-const FAST: f64 = 3.0;
+/// Repetitions by Newton's method.
+const NEWTON: u32 = 20;
 pub(super) const LARGEST_REPETITIONS: u32 = 200;
 
 /// Extra torques of one robot, with their memory.
@@ -47,10 +50,14 @@ pub(super) struct JointExtensions {
     /// Mean rates of the joints in the last step (rad/s), and the moment against them with its derivative.
     rates: Vec<Lanes>,
     resisting: Vec<[Lanes; 2]>,
+    /// The derivative at rest.
+    at_rest_slope: Vec<Lanes>,
     /// Slope s and constant part e* + s u* of friction in the last repetition.
     friction_put: Vec<[Lanes; 2]>,
-    /// True for joints whose rate changed sign in this step's repetitions.
-    turned_back: Vec<[bool; 4]>,
+    /// 1 for joints whose rate changed its sign in the last repetition.
+    turned: Vec<Lanes>,
+    /// Repetitions of this step.
+    repetitions: u32,
     /// q_j of the Prony chain (rad).
     memory: Vec<[Lanes; LOSS_TIMES.len()]>,
     /// Elastic angles of the springs with a limit (rad), quads × springs.
@@ -59,7 +66,7 @@ pub(super) struct JointExtensions {
 
 impl JointExtensions {
     /// `None` for the plain model.
-    pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Self> {
+    pub(super) fn new(extensions: &Extensions, width: f64, link: f64, step: f64, quads: &[Quad]) -> Option<Box<Self>> {
         let hardening = extensions.clamp_hardening.powi(2);
         if !extensions.bends_torque_law() && !extensions.has_drag() && hardening == 0.0 {
             return None;
@@ -83,15 +90,18 @@ impl JointExtensions {
             joint: joint.collect(),
             rates: vec![Lanes::ZERO; count],
             resisting: vec![[Lanes::ZERO; 2]; count],
+            at_rest_slope: vec![Lanes::ZERO; count],
             friction_put: vec![[Lanes::ZERO; 2]; count],
-            turned_back: vec![[false; 4]; count],
+            turned: vec![Lanes::ZERO; count],
+            repetitions: 0,
             memory: vec![Default::default(); count],
             slips: vec![Lanes::ZERO; count * extensions.slips.len()],
             extensions: extensions.clone(),
             link,
         };
+        new.at_rest_slope = (0..count).map(|k| new.resisting_at(k, Lanes::ZERO)[1]).collect();
         new.resist();
-        Some(new)
+        Some(Box::new(new))
     }
 
     /// Sets the moments against the present rates.
@@ -101,9 +111,21 @@ impl JointExtensions {
         }
     }
 
-    /// Moment against the rates of quad `k`'s joints, and its derivative.
+    /// Moment against the rates (rad/s) of quad `k`'s joints, and its derivative.
+    #[inline(always)]
     fn resisting_at(&self, k: usize, rate: Lanes) -> [Lanes; 2] {
-        self.of_joints(k, |lane| self.resistance(lane, rate.lane(lane)))
+        let Extensions { dry_friction, moment_of_rate, .. } = &self.extensions;
+        let share = if *dry_friction == 0.0 { Lanes::ZERO } else { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() };
+        let moment = Lanes::splat(*dry_friction) * share;
+        let slope = Lanes::splat(dry_friction / DRY_FRICTION_RATE) * (Lanes::splat(1.0) - share * share);
+        if moment_of_rate.is_zero() {
+            return [moment, slope].map(|of| self.joint[k] * of);
+        }
+        let [more, steeper] = self.of_joints(k, |lane| {
+            let [moment, slope] = moment_of_rate.at(sense(lane) * rate.lane(lane) / self.link);
+            [sense(lane) * moment, slope / self.link]
+        });
+        [self.joint[k] * moment + more, self.joint[k] * slope + steeper]
     }
 
     pub(super) fn set_time_step(&mut self, step: f64, quads: &[Quad]) {
@@ -133,18 +155,22 @@ impl JointExtensions {
     fn elastic(&self, k: usize, quad: &Quad, delta: Lanes) -> (Lanes, Lanes) {
         let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
         if self.softening != 0.0 {
-            let most = 1.0 - LEAST_STIFFNESS;
+            // As `Extensions::softened`.
+            let most = Lanes::splat(1.0 - LEAST_STIFFNESS);
             let exponent = self.extensions.softening_exponent;
-            let [softened, tangent] = self.of_joints(k, |lane| {
-                let delta = delta.lane(lane);
-                let share = match exponent {
-                    2.0 => self.softening * delta * delta,
-                    _ => self.extensions.softened(delta / self.link),
-                };
-                [share.min(most) * delta, if share < most { (exponent + 1.0) * share } else { most }]
-            });
-            torque = quad.stiffness * softened;
-            slope = quad.stiffness * tangent;
+            let power = match exponent {
+                2.0 => delta * delta,
+                _ => {
+                    let unit = self.link * SOFTENING_CURVATURE;
+                    let relative = (Lanes::splat(1.0 / unit) * delta.abs()).at_least(f64::MIN_POSITIVE);
+                    Lanes::splat(unit * unit) * relative.powf(exponent)
+                }
+            };
+            let share = Lanes::splat(self.softening) * power;
+            let is_free = most - share;
+            let stiffness = self.joint[k] * quad.stiffness;
+            torque = stiffness * share.where_positive(is_free, most) * delta;
+            slope = stiffness * (Lanes::splat(exponent + 1.0) * share).where_positive(is_free, most);
         }
         let curve = &self.extensions.moment_of_curvature;
         if !curve.is_zero() {
@@ -190,12 +216,6 @@ impl JointExtensions {
         self.at_rest(k, quad, delta) - (friction + self.joint[k] * slips) - quad.stiffness * stored
     }
 
-    /// Moment against the rate (rad/s) of the joint in a lane, and its derivative.
-    fn resistance(&self, lane: usize, rate: f64) -> [f64; 2] {
-        let [moment, slope] = self.extensions.friction(self.link, sense(lane) * rate);
-        [sense(lane) * moment, slope]
-    }
-
     /// Elastic angles of the springs with a limit of quad `k`, each with its stiffness (dyn·cm/rad) and its limit (rad).
     fn slips_of(&self, k: usize) -> impl Iterator<Item = (&Lanes, [f64; 2])> {
         let slips = &self.extensions.slips;
@@ -207,26 +227,33 @@ impl JointExtensions {
     }
 
     /// Begins a step: stores the plain model's torques.
+    #[inline(always)]
     pub(super) fn begin(&mut self, quads: &[Quad]) {
         for (torque, quad) in self.torque.iter_mut().zip(quads) {
             *torque = quad.torque;
         }
-        self.turned_back.fill([false; 4]);
+        self.turned.fill(Lanes::ZERO);
+        self.repetitions = 0;
     }
 
-    /// Slope s and constant part e* + s u* of friction about the last rate of the joint in a lane of quad `k`.
-    fn friction(&self, k: usize, lane: usize) -> [f64; 2] {
-        let [moment, slope] = self.resisting[k].map(|of| of.lane(lane));
-        let (u, turned_back) = (self.rates[k].lane(lane), self.turned_back[k][lane]);
-        // A curve of the rate is smooth.
-        if (!self.is_repeated() || u.abs() > FAST * DRY_FRICTION_RATE) && !turned_back {
-            [slope, slope * u - moment]
-        } else {
-            [if u.abs() < 1e-6 * DRY_FRICTION_RATE { slope } else { moment / u }, 0.0]
+    /// Slope s and constant part e* + s u* of friction about the last rates of quad `k`'s joints.
+    #[inline(always)]
+    fn friction(&self, k: usize) -> [Lanes; 2] {
+        let ([moment, slope], rate) = (self.resisting[k], self.rates[k]);
+        if self.repetitions <= NEWTON {
+            // A curve of the rate is 0 at rest, too.
+            let turned = Lanes::splat(0.5) - self.turned[k];
+            return [
+                slope.where_positive(turned, self.at_rest_slope[k]),
+                (slope * rate - moment).where_positive(turned, Lanes::ZERO),
+            ];
         }
+        let moves = rate.abs() - Lanes::splat(1e-6 * DRY_FRICTION_RATE);
+        [moment.over(rate).where_positive(moves, slope), Lanes::ZERO]
     }
 
     /// Adds the extra torques, linearised about the last rates, to the joints: their impulses over `share` (s).
+    #[inline(always)]
     pub(super) fn load(&mut self, quads: &mut [Quad], share: f64) {
         let share = Lanes::splat(share);
         let half = Lanes::splat(self.half_step);
@@ -253,7 +280,7 @@ impl JointExtensions {
                 slope += joint * (half * held);
             }
             if self.friction != 0.0 {
-                let [tangent, rest] = self.of_joints(k, |lane| self.friction(k, lane));
+                let [tangent, rest] = self.friction(k);
                 self.friction_put[k] = [tangent, rest];
                 slope += tangent;
                 torque += rest;
@@ -272,6 +299,7 @@ impl JointExtensions {
     }
 
     /// Takes the joints' mean rates of a solution; true if the linearised friction agrees with the law there.
+    #[inline(always)]
     pub(super) fn accept(&mut self, quads: &[Quad]) -> bool {
         let mut before = f64x2::ZERO;
         let mut changed = 0.0_f64;
@@ -285,19 +313,18 @@ impl JointExtensions {
                 let [slope, rest] = self.friction_put[k];
                 let resisting = self.resisting_at(k, rate);
                 let missed = (slope * rate - rest - resisting[0]).abs();
-                let (now, before) = (rate, self.rates[k]);
-                for lane in (0..4).filter(|lane| self.joint[k].lane(*lane) > 0.0) {
-                    changed = changed.max(missed.lane(lane) / self.friction);
-                    self.turned_back[k][lane] |= now.lane(lane) * before.lane(lane) < 0.0;
-                }
+                changed = missed.to_array().into_iter().fold(changed, f64::max);
+                self.turned[k] = Lanes::splat(1.0).where_positive(-(rate * self.rates[k]), Lanes::ZERO);
                 self.resisting[k] = resisting;
             }
             self.rates[k] = rate;
         }
-        changed <= FRICTION_ENOUGH
+        self.repetitions += 1;
+        changed <= FRICTION_ENOUGH * self.friction
     }
 
     /// Ends a step: advances the memory.
+    #[inline(always)]
     pub(super) fn end(&mut self) {
         if self.extensions.has_loss() {
             for (memory, rate) in self.memory.iter_mut().zip(&self.rates) {
@@ -317,16 +344,25 @@ impl JointExtensions {
     }
 
     /// Drag on the bodies: moment about the centre of mass (dyn·cm) and force (dyn).
+    #[inline(always)]
     pub(super) fn drag(&self, quad: &Quad) -> [Lanes; 3] {
         let [rate, x, z] = quad.motion;
         let normal = [-quad.along[1], quad.along[0]];
         let speed = x * normal[0] + z * normal[1];
+        let Extensions { drag: [linear, quadratic, cubic], drag_of_power: [coefficient, power], .. } = self.extensions;
+        let [linear, quadratic, cubic] = [linear, quadratic, cubic].map(Lanes::splat);
+        let whole = Lanes::splat(-0.5 * 0.5 * AIR_DENSITY * self.width * DRAG_SPEED) * quad.reach.abs();
         let (mut force, mut moment) = (Lanes::ZERO, Lanes::ZERO);
         for (at, weight) in GAUSS {
             let arm = (Lanes::splat(0.5 + 0.5 * at) - quad.middle) * quad.reach;
             let speed = speed + rate * arm;
-            let per_speed = speed.map(|v| if v == 0.0 { 0.0 } else { self.extensions.drag_per_speed(self.width, v) });
-            let part = Lanes::splat(-0.5 * weight) * per_speed * quad.reach.abs() * speed;
+            // As `Extensions::drag_per_speed`.
+            let ratio = Lanes::splat(1.0 / DRAG_SPEED) * speed.abs();
+            let mut per_speed = linear + ratio * (quadratic + ratio * cubic);
+            if coefficient != 0.0 {
+                per_speed += Lanes::splat(coefficient) * ratio.at_least(LEAST_DRAG_RATIO).powf(power - 1.0);
+            }
+            let part = Lanes::splat(weight) * whole * per_speed * speed;
             force += part;
             moment += part * arm;
         }

@@ -7,7 +7,7 @@ use std::array::from_fn;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 use fearless_simd::{Simd, prelude::*};
-use wide::f64x2;
+use wide::{f64x2, f64x4};
 
 /// One number of four bodies: left and right arm at one tree level, then left and right arm at the next level.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -22,10 +22,12 @@ pub(super) type Two<S> = fearless_simd::f64x2<S>;
 impl Lanes {
     pub(super) const ZERO: Self = Self([0.0; 4]);
 
+    #[inline(always)]
     pub(super) fn new(values: [f64; 4]) -> Self {
         Self(values)
     }
 
+    #[inline(always)]
     pub(super) fn splat(value: f64) -> Self {
         Self([value; 4])
     }
@@ -35,21 +37,51 @@ impl Lanes {
         Four::simd_from(simd, self.0)
     }
 
+    #[inline(always)]
     pub(super) fn to_array(self) -> [f64; 4] {
         self.0
     }
 
+    #[inline(always)]
     pub(super) fn map(self, of: impl Fn(f64) -> f64) -> Self {
         Self(from_fn(|i| of(self.0[i])))
     }
 
     /// These lanes where `mask` is positive, `other` elsewhere.
+    #[inline(always)]
     pub(super) fn where_positive(self, mask: Self, other: Self) -> Self {
         Self(std::array::from_fn(|lane| if mask.0[lane] > 0.0 { self.0[lane] } else { other.0[lane] }))
     }
 
+    #[inline(always)]
     pub(super) fn abs(self) -> Self {
         self.map(f64::abs)
+    }
+
+    #[inline(always)]
+    pub(super) fn over(self, divisor: Self) -> Self {
+        Self(from_fn(|i| self.0[i] / divisor.0[i]))
+    }
+
+    /// Powers of positive numbers, to some units in the last place.
+    #[inline(always)]
+    pub(super) fn powf(self, power: f64) -> Self {
+        Self(f64x4::new(self.0).powf_simd(f64x4::splat(power)).to_array())
+    }
+
+    /// The larger of each lane and `least`.
+    #[inline(always)]
+    pub(super) fn at_least(self, least: f64) -> Self {
+        self.map(|value| value.max(least))
+    }
+
+    /// Hyperbolic tangents, to some units in the last place of 1.
+    #[inline(always)]
+    pub(super) fn tanh(self) -> Self {
+        let one = f64x4::splat(1.0);
+        let gone = (f64x4::new(self.abs().0) * f64x4::splat(-2.0)).exp();
+        let sizes = ((one - gone) / (one + gone)).to_array();
+        Self(from_fn(|i| sizes[i].copysign(self.0[i])))
     }
 
     /// The sum, in an order that does not depend on the machine.
@@ -59,6 +91,7 @@ impl Lanes {
         (a + c) + (b + d)
     }
 
+    #[inline(always)]
     pub(super) fn lane(&self, lane: usize) -> f64 {
         self.0[lane]
     }
@@ -116,6 +149,7 @@ macro_rules! in_each_lane {
         impl $operation for Lanes {
             type Output = Self;
 
+            #[inline(always)]
             fn $name(self, other: Self) -> Self {
                 Self(from_fn(|i| self.0[i] $sign other.0[i]))
             }
@@ -129,12 +163,14 @@ in_each_lane!(Mul, mul, *);
 impl Neg for Lanes {
     type Output = Self;
 
+    #[inline(always)]
     fn neg(self) -> Self {
         self.map(|value| -value)
     }
 }
 
 impl AddAssign for Lanes {
+    #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }

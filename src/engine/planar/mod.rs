@@ -98,7 +98,7 @@ pub struct PlanarEngine {
     /// Rest angle of each joint at 0 V (rad), and factor on its voltage; empty in the plain model.
     rest_angles: Vec<f64>,
     gains: Vec<f64>,
-    extensions: Option<JointExtensions>,
+    extensions: Option<Box<JointExtensions>>,
     attachments: Option<Attachments>,
     time_step: f64,
     gravity: f64,

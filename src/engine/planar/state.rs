@@ -1,7 +1,6 @@
 //! States as numbers: saved ones, which outlive the engine, and checkpoints of a run with adaptive steps.
 
 use super::attachment::Attachments;
-use super::joint_extensions::JointExtensions;
 use super::lanes::Lanes;
 use super::quad::Quad;
 use super::{EngineError, PlanarEngine, place};
@@ -40,12 +39,12 @@ impl PlanarEngine {
 
     /// Memory of joint extensions, then of what is fixed to the sheet.
     fn saved_extensions(&self) -> impl Iterator<Item = f64> + '_ {
-        let joints = self.extensions.iter().flat_map(JointExtensions::saved);
+        let joints = self.extensions.iter().flat_map(|joints| joints.saved());
         joints.chain(self.attachments.iter().flat_map(Attachments::saved))
     }
 
     fn restore_extensions(&mut self, memory: &[f64]) {
-        let (joints, points) = memory.split_at(self.extensions.iter().flat_map(JointExtensions::saved).count());
+        let (joints, points) = memory.split_at(self.extensions.iter().flat_map(|joints| joints.saved()).count());
         if let Some(extensions) = &mut self.extensions {
             extensions.restore(joints);
         }

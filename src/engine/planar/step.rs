@@ -2,7 +2,7 @@
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::joint_extensions::{JointExtensions, LARGEST_REPETITIONS};
+use super::joint_extensions::LARGEST_REPETITIONS;
 use super::lanes::{Four, Lanes, Two, fma, inner, on};
 use super::quad::{Motions, Quad};
 use super::recursion::{BaseJoint, Turn};
@@ -95,7 +95,7 @@ impl PlanarEngine {
         let (mut extensions, height) = (self.extensions.take(), self.root_height(simd));
         let Some(attachments) = &mut self.attachments else { return Ok(()) };
         attachments.begin(&self.quads, height);
-        let is_repeated = attachments.is_repeated() || extensions.as_ref().is_some_and(JointExtensions::is_repeated);
+        let is_repeated = attachments.is_repeated() || extensions.as_ref().is_some_and(|joints| joints.is_repeated());
         if let Some(extensions) = &mut extensions {
             extensions.begin(&self.quads);
         }
