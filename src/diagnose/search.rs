@@ -3,7 +3,7 @@
 //! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 120 lines are tests.
+//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 140 lines are tests.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -676,7 +676,7 @@ impl Search<'_> {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
         if own.is_variant {
-            return self.with_its_plain_law(scored, index);
+            return Ok(self.with_its_plain_law(scored, index));
         }
         let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
@@ -706,15 +706,12 @@ impl Search<'_> {
         Ok(if self.is_significant(&best, &scored) { best } else { scored })
     }
 
-    /// The model with the plain law of the cause of term `index`, unless its own law is significantly better.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if the plain law cannot be fitted.
-    pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
+    /// The model with the plain law of the cause of term `index`, unless its own law is significantly better or the plain one cannot be fitted.
+    pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Scored {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
         if !own.is_variant {
-            return Ok(scored);
+            return scored;
         }
         let of_plain = |candidate: usize| {
             let plain = &self.estimator.plant.candidates()[candidate];
@@ -722,12 +719,14 @@ impl Search<'_> {
             let x = plain.parameters.iter().map(at).collect::<Option<Vec<f64>>>()?;
             (plain.id == own.id && !plain.is_variant).then_some(Term { candidate, x })
         };
-        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return Ok(scored) };
+        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return scored };
         (self.progress)(&format!("the plain law of {}", own.id));
         let mut model = scored.model().clone();
         model.terms[index] = plain;
-        let plain = self.fitted_at_its_spread(&model)?;
-        Ok(if self.is_significant(&scored, &plain) { scored } else { plain })
+        match self.fitted_at_its_spread(&model) {
+            Ok(plain) if !self.is_significant(&scored, &plain) => plain,
+            _ => scored,
+        }
     }
 
     /// Sets what re-tuned constants leave to what `constants` leaves.
@@ -1099,7 +1098,14 @@ mod tests {
                 fixed: Vec::new(),
                 starts: vec![vec![1.0]],
             };
-            Self { signals: (0..6).map(signal).collect(), candidates: ["other", "first", "second"].map(candidate).to_vec() }
+            let mut candidates = ["other", "first", "second"].map(candidate).to_vec();
+            // Another law of the second cause, with a part of the other one.
+            let mut variant = candidate("second");
+            variant.is_variant = true;
+            variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
+            variant.starts = vec![vec![1.0, 1.0]];
+            candidates.push(variant);
+            Self { signals: (0..6).map(signal).collect(), candidates }
         }
     }
 
@@ -1126,21 +1132,21 @@ mod tests {
             run: usize,
             _nuisance: &crate::diagnose::plant::Nuisance,
         ) -> Result<Vec<f64>, DiagnoseError> {
-            let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
+            let of = |term: &Term, at| {
+                let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
+                term.x[0] * wave(self.candidates[term.candidate].id, run, at) + more
+            };
             Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
         }
     }
 
+    fn search(plant: &Waves) -> Search<'_> {
+        let split = split(plant, &[Role::Auto; 6]);
+        Search { estimator: Estimator::new(plant), split, unexplained: 0.0, limit: f64::INFINITY, progress: &|_: &str| {} }
+    }
+
     fn found(plant: &Waves) -> Vec<&'static str> {
-        let progress = |_: &str| {};
-        let estimator = Estimator::new(plant);
-        let mut search = Search {
-            estimator,
-            split: split(plant, &[Role::Auto; 6]),
-            unexplained: 0.0,
-            limit: f64::INFINITY,
-            progress: &progress,
-        };
+        let mut search = search(plant);
         let plain = search.calibrated(1.0).unwrap();
         let (best, _) = search.forward(plain).unwrap();
         best.model().terms.iter().map(|term| search.id(term.candidate)).collect()
@@ -1159,5 +1165,17 @@ mod tests {
         assert_eq!(found(&Waves::new(&[("other", 1.0)])), ["other"]);
         assert_eq!(found(&Waves::new(&[("first", 1.0)])), ["first"]);
         assert!(found(&Waves::new(&[])).is_empty());
+    }
+
+    #[test]
+    fn a_law_with_a_further_parameter_gives_way_where_it_is_not_needed() {
+        for (other, stays) in [(0.0, false), (1.0, true)] {
+            let plant = Waves::new(&[("second", 5.0), ("other", other)]);
+            let search = search(&plant);
+            let scored = search.fitted(&Model::new(vec![Term { candidate: 3, x: vec![1.0, 1.0] }], 1.0, false)).unwrap();
+            let term = search.with_its_plain_law(scored, 0).model().terms[0].clone();
+            assert_eq!(term.x.len() == 2, stays, "{term:?}");
+            assert!((term.x[0] - 5.0).abs() < 0.2, "{term:?}");
+        }
     }
 }
