@@ -119,12 +119,25 @@ pub struct Trial {
     pub scored: Scored,
 }
 
+/// What a model's coordinates and the candidates do to the residuals of all runs, to first order about the model.
+pub(super) struct Responses {
+    /// The model.
+    about: Model,
+    /// Derivatives by its coordinates.
+    derivatives: Derivatives,
+    /// The change by every start of every candidate.
+    starts: Changes,
+}
+
+/// Starts with their changes of the residuals.
+type Changes = Vec<(Term, DVector<f64>)>;
+
 /// Linearised effect of the candidates.
 pub struct Screened {
     /// Every start of every candidate: its linear estimate of the fall of χ², and the model to fit from; best first.
     pub ranked: Vec<(f64, Model)>,
     /// Every start with its change of the residuals, orthogonal to the model's tangents.
-    pub(super) columns: Vec<(Term, DVector<f64>)>,
+    pub(super) columns: Changes,
     /// The residuals, orthogonal to the model's tangents.
     pub(super) rest: DVector<f64>,
     /// The model's tangents, orthonormal.
@@ -416,7 +429,15 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the model cannot be simulated with all constants.
     pub fn with_significant_constants(&self, from: Scored) -> Result<Scored, DiagnoseError> {
         let own = from.model().terms.len();
-        let mut all = self.fitted(&self.with_constants(from.model()))?;
+        let missing = self.with_constants(from.model()).terms.split_off(own);
+        let is_missing = |c: &Candidate| missing.iter().any(|term| self.id(term.candidate) == c.id);
+        let screened = self.screen_of(&from, is_missing)?;
+        let of = |term: &Term| screened.columns.iter().find(|(start, _)| start.candidate == term.candidate);
+        let columns: Vec<_> = missing.iter().filter_map(of).collect();
+        let estimate = least_squares(&columns, &screened.rest);
+        let Some((_, weights)) = estimate.filter(|(gain, _)| *gain > LEAST_BIC) else { return Ok(from) };
+        let starts = columns.iter().zip(weights.iter()).map(|((start, _), along)| self.moved(start, *along).0);
+        let mut all = self.fitted(&with(from.model(), starts))?;
         while all.model().terms.len() > own {
             let without = |index: usize| self.ranked(&self.without(&all, index).ok()?).ok();
             let shorter = (own..all.model().terms.len()).filter_map(without);
@@ -453,23 +474,50 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub(super) fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
+        Ok(self.screened(from, &self.responses(from.model(), is_wanted)?, None, &Vec::new()))
+    }
+
+    /// What the coordinates of a model and those candidates that are wanted do, with the time steps of the search.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn responses(&self, about: &Model, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Responses, DiagnoseError> {
+        let about = Model { fine: false, ..about.clone() };
+        let derivatives = self.estimator.derivatives(&about, &self.split.all())?;
+        let starts = self.changes(&about, |_, c| is_wanted(c))?;
+        Ok(Responses { about, derivatives, starts })
+    }
+
+    /// The change of the residuals by every start of those candidates that are wanted and not in the model yet.
+    fn changes(&self, about: &Model, is_wanted: impl Fn(usize, &Candidate) -> bool) -> Result<Changes, DiagnoseError> {
         let runs = self.split.all();
-        let base = from.model();
-        let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
-        let candidates = self.estimator.plant.candidates();
-        let wanted = candidates.iter().enumerate().filter(|(_, c)| is_wanted(c) && !used.contains(&c.id));
+        let used: Vec<&str> = about.terms.iter().map(|term| self.id(term.candidate)).collect();
+        let candidates = self.estimator.plant.candidates().iter().enumerate();
+        let wanted = candidates.filter(|(index, c)| is_wanted(*index, c) && !used.contains(&c.id));
         let starts: Vec<Term> =
             wanted.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
-        let plain = joined(from, &runs);
-        let derivatives = self.estimator.derivatives(base, &runs)?;
-        let own = tangents(&derivatives);
-        let rest = without_directions(&own, &plain);
-        let column = |term: Term| {
-            let residuals = self.estimator.residuals_of(&with(base, [term.clone()]), &runs).ok()?;
-            let column = without_directions(&own, &(DVector::from_vec(residuals.concat()) - &plain));
-            (column.norm_squared() > 1e-12).then_some((term, column))
+        let plain = DVector::from_vec(self.estimator.residuals_of(about, &runs)?.concat());
+        let change = |term: Term| {
+            let residuals = self.estimator.residuals_of(&with(about, [term.clone()]), &runs).ok()?;
+            Some((term, DVector::from_vec(residuals.concat()) - &plain))
         };
-        let columns: Vec<(Term, DVector<f64>)> = starts.into_par_iter().filter_map(column).collect();
+        Ok(starts.into_par_iter().filter_map(change).collect())
+    }
+
+    /// Linear estimates of how far every start would lower χ² of `from`, beyond a refit of its own coordinates. `from` is the model of the responses, or
+    /// that one without its term `removed`: what candidates do hardly depends on it. `more` starts belong to `from` itself.
+    pub(super) fn screened(&self, from: &Scored, responses: &Responses, removed: Option<usize>, more: &Changes) -> Screened {
+        let (base, candidates) = (from.model(), self.estimator.plant.candidates());
+        let of_base = coordinates(&responses.about).into_iter().zip(&responses.derivatives);
+        let derivatives: Derivatives =
+            of_base.filter(|((term, _), _)| Some(*term) != removed).map(|(_, column)| column.clone()).collect();
+        let own = tangents(&derivatives);
+        let rest = without_directions(&own, &joined(from, &self.split.all()));
+        let column = |(term, change): &(Term, DVector<f64>)| {
+            let column = without_directions(&own, change);
+            (column.norm_squared() > 1e-12).then_some((term.clone(), column))
+        };
+        let columns: Changes = responses.starts.par_iter().chain(more).filter_map(column).collect();
         let mut ranked = Vec::new();
         for (candidate, _) in candidates.iter().enumerate().filter(|(_, c)| c.is_free_form) {
             let own: Vec<_> = columns.iter().filter(|(term, _)| term.candidate == candidate).collect();
@@ -483,7 +531,7 @@ impl Search<'_> {
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (residuals, terms) = (from.residuals.clone(), base.terms.len());
-        Ok(Screened { ranked, columns, rest, tangents: own, derivatives, residuals, terms })
+        Screened { ranked, columns, rest, tangents: own, derivatives, residuals, terms }
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -491,11 +539,7 @@ impl Search<'_> {
     fn free_start(&self, columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Option<(f64, Term)> {
         let mut kept: Vec<&(Term, DVector<f64>)> = columns.to_vec();
         while let Some((first, _)) = kept.first() {
-            let n = kept.len();
-            let mut information = DMatrix::from_fn(n, n, |i, j| kept[i].1.dot(&kept[j].1));
-            (0..n).for_each(|k| information[(k, k)] *= 1.0 + 1e-6);
-            let right = DVector::from_fn(n, |k, _| -kept[k].1.dot(rest));
-            let weights = information.lu().solve(&right)?;
+            let (gain, weights) = least_squares(&kept, rest)?;
             let mut term = Term { candidate: first.candidate, x: vec![0.0; first.x.len()] };
             for ((start, _), weight) in kept.iter().zip(weights.iter()) {
                 term.x.iter_mut().zip(&start.x).for_each(|(x, by)| *x += weight * by);
@@ -506,11 +550,11 @@ impl Search<'_> {
                 let [low, high] = parameters[at].bounds;
                 (low - term.x[at]).max(term.x[at] - high) / parameters[at].scale
             };
-            match (0..n).filter(|k| excess(*k) > 0.0).max_by(|a, b| excess(*a).total_cmp(&excess(*b))) {
+            match (0..kept.len()).filter(|k| excess(*k) > 0.0).max_by(|a, b| excess(*a).total_cmp(&excess(*b))) {
                 Some(worst) => {
                     kept.remove(worst);
                 }
-                None => return Some((right.dot(&weights), term)),
+                None => return Some((gain, term)),
             }
         }
         None
@@ -903,15 +947,20 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
+        (self.progress)("screening all candidates beside the causes");
+        let responses = self.responses(best.model(), |candidate| !candidate.is_free_form)?;
         for (index, removed) in best.model().terms.iter().enumerate() {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
             let without = self.without(best, index).and_then(|model| self.ranked_at_its_spread(&model));
             let Ok(without) = without else { continue };
-            let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?;
-            let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
+            // Other laws of a cause cannot be tried beside it.
+            let laws = self.changes(without.model(), |other, c| {
+                !c.is_free_form && c.id == self.id(removed.candidate) && other != removed.candidate
+            })?;
+            let screened = self.screened(&without, &responses, Some(index), &laws);
             let own = without.total() - best.total();
-            let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m);
+            let is_promising = |(gain, _): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own;
             // One law of each cause: the others are tried once it has the place.
             for model in first_of_each(screened.ranked.iter().filter(is_promising), most, |term| self.id(term.candidate)) {
                 let Some(term) = model.terms.last() else { continue };
@@ -977,6 +1026,16 @@ fn first_of_each<'m, K: PartialEq>(
         }
     }
     chosen
+}
+
+/// Least squares of −`rest` on the columns of starts: the fall of χ², and the weights; none without columns.
+fn least_squares(columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
+    let n = columns.len();
+    let mut information = DMatrix::from_fn(n, n, |i, j| columns[i].1.dot(&columns[j].1));
+    (0..n).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
+    let right = DVector::from_fn(n, |k, _| -columns[k].1.dot(rest));
+    let weights = information.lu().solve(&right).filter(|_| n > 0)?;
+    Some((right.dot(&weights), weights))
 }
 
 /// The residuals of runs, one after the other.
