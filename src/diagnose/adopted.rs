@@ -6,7 +6,7 @@ use super::curve::curve;
 use super::diagnosis::{Adopted, Estimate, Nearest, Part};
 use super::intervals::Intervals;
 use super::plant::{Model, Term};
-use super::search::{Scored, Search, VISIBLE};
+use super::search::{Responses, Scored, Screened, Search, VISIBLE};
 use super::stability::{Standing, standing};
 use super::ties::{Ties, pair_in_place};
 use super::unseen::Unseen;
@@ -54,13 +54,20 @@ struct Weighed {
     pair: Option<Model>,
 }
 
-/// Weighs term `index` of `best`.
-fn weighed(search: &Search, best: &Scored, index: usize, ties: &Ties) -> Result<Weighed, DiagnoseError> {
+/// Weighs term `index` of `best`, given its screening and what all candidates do beside it.
+fn weighed(
+    search: &Search,
+    (best, screened): (&Scored, &Screened),
+    index: usize,
+    ties: &Ties,
+    responses: &Responses,
+) -> Result<Weighed, DiagnoseError> {
     (search.progress)(&format!("the gain of {}", search.id(best.model().terms[index].candidate)));
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let mut tied_with = ties.of(search, best, index);
-    let (standing, screened) = standing(search, best, &without, index, &ties.rivals_of(index))?;
-    let (set, pair) = pair_in_place(search, best, (&without, &screened), index, &tied_with)?.unzip();
+    let without_it = search.screened(&without, responses, Some(index), &Vec::new());
+    let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
+    let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with)?.unzip();
     tied_with.extend(set);
     Ok(Weighed { without, standing, tied_with, pair })
 }
@@ -87,9 +94,14 @@ pub(super) fn adopted(
     ties: &Ties,
 ) -> Result<Adoption, DiagnoseError> {
     let best = &judged.best;
-    let count = best.model().terms.len();
-    let weighed: Vec<Weighed> =
-        (0..count).map(|index| weighed(search, best, index, ties)).collect::<Result<_, DiagnoseError>>()?;
+    let terms = &best.model().terms;
+    // Free forms count in the stead of constants only.
+    let has_constants = terms.iter().any(|term| search.candidate(term).is_constant);
+    let responses = search.responses(best.model(), |c| if c.is_free_form { has_constants } else { !c.is_variant })?;
+    let screened = search.screened(best, &responses, None, &Vec::new());
+    let weighed: Vec<Weighed> = (0..terms.len())
+        .map(|index| weighed(search, (best, &screened), index, ties, &responses))
+        .collect::<Result<_, DiagnoseError>>()?;
     let needs: Vec<&[usize]> = weighed.iter().map(|weighed| weighed.standing.needs.as_slice()).collect();
     let unseen = Unseen::of(search, best, &needs)?;
     let mut effects = Vec::new();

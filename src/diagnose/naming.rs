@@ -179,7 +179,7 @@ impl<'a> Place<'a> {
         (self.search.progress)(&format!("{name} in the stead of {}", self.search.candidate(&self.free).id));
         let mut scored = self.search.fitted_at_its_spread(model).ok()?;
         for index in 0..scored.model().terms.len() - 1 {
-            scored = self.search.with_its_plain_law(scored, index).ok()?;
+            scored = self.search.with_its_plain_law(scored, index);
         }
         Some(Attempt { name, taken: self.taken(&scored), scored })
     }

@@ -3,7 +3,7 @@
 //! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 120 lines are tests.
+//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 140 lines are tests.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -119,12 +119,25 @@ pub struct Trial {
     pub scored: Scored,
 }
 
+/// What a model's coordinates and the candidates do to the residuals of all runs, to first order about the model.
+pub(super) struct Responses {
+    /// The model.
+    about: Model,
+    /// Derivatives by its coordinates.
+    derivatives: Derivatives,
+    /// The change by every start of every candidate.
+    starts: Changes,
+}
+
+/// Starts with their changes of the residuals.
+type Changes = Vec<(Term, DVector<f64>)>;
+
 /// Linearised effect of the candidates.
 pub struct Screened {
     /// Every start of every candidate: its linear estimate of the fall of χ², and the model to fit from; best first.
     pub ranked: Vec<(f64, Model)>,
     /// Every start with its change of the residuals, orthogonal to the model's tangents.
-    pub(super) columns: Vec<(Term, DVector<f64>)>,
+    pub(super) columns: Changes,
     /// The residuals, orthogonal to the model's tangents.
     pub(super) rest: DVector<f64>,
     /// The model's tangents, orthonormal.
@@ -416,7 +429,15 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the model cannot be simulated with all constants.
     pub fn with_significant_constants(&self, from: Scored) -> Result<Scored, DiagnoseError> {
         let own = from.model().terms.len();
-        let mut all = self.fitted(&self.with_constants(from.model()))?;
+        let missing = self.with_constants(from.model()).terms.split_off(own);
+        let is_missing = |c: &Candidate| missing.iter().any(|term| self.id(term.candidate) == c.id);
+        let screened = self.screen_of(&from, is_missing)?;
+        let of = |term: &Term| screened.columns.iter().find(|(start, _)| start.candidate == term.candidate);
+        let columns: Vec<_> = missing.iter().filter_map(of).collect();
+        let estimate = least_squares(&columns, &screened.rest);
+        let Some((_, weights)) = estimate.filter(|(gain, _)| *gain > LEAST_BIC) else { return Ok(from) };
+        let starts = columns.iter().zip(weights.iter()).map(|((start, _), along)| self.moved(start, *along).0);
+        let mut all = self.fitted(&with(from.model(), starts))?;
         while all.model().terms.len() > own {
             let without = |index: usize| self.ranked(&self.without(&all, index).ok()?).ok();
             let shorter = (own..all.model().terms.len()).filter_map(without);
@@ -453,23 +474,50 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub(super) fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
+        Ok(self.screened(from, &self.responses(from.model(), is_wanted)?, None, &Vec::new()))
+    }
+
+    /// What the coordinates of a model and those candidates that are wanted do, with the time steps of the search.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn responses(&self, about: &Model, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Responses, DiagnoseError> {
+        let about = Model { fine: false, ..about.clone() };
+        let derivatives = self.estimator.derivatives(&about, &self.split.all())?;
+        let starts = self.changes(&about, |_, c| is_wanted(c))?;
+        Ok(Responses { about, derivatives, starts })
+    }
+
+    /// The change of the residuals by every start of those candidates that are wanted and not in the model yet.
+    fn changes(&self, about: &Model, is_wanted: impl Fn(usize, &Candidate) -> bool) -> Result<Changes, DiagnoseError> {
         let runs = self.split.all();
-        let base = from.model();
-        let used: Vec<&str> = base.terms.iter().map(|term| self.id(term.candidate)).collect();
-        let candidates = self.estimator.plant.candidates();
-        let wanted = candidates.iter().enumerate().filter(|(_, c)| is_wanted(c) && !used.contains(&c.id));
+        let used: Vec<&str> = about.terms.iter().map(|term| self.id(term.candidate)).collect();
+        let candidates = self.estimator.plant.candidates().iter().enumerate();
+        let wanted = candidates.filter(|(index, c)| is_wanted(*index, c) && !used.contains(&c.id));
         let starts: Vec<Term> =
             wanted.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
-        let plain = joined(from, &runs);
-        let derivatives = self.estimator.derivatives(base, &runs)?;
-        let own = tangents(&derivatives);
-        let rest = without_directions(&own, &plain);
-        let column = |term: Term| {
-            let residuals = self.estimator.residuals_of(&with(base, [term.clone()]), &runs).ok()?;
-            let column = without_directions(&own, &(DVector::from_vec(residuals.concat()) - &plain));
-            (column.norm_squared() > 1e-12).then_some((term, column))
+        let plain = DVector::from_vec(self.estimator.residuals_of(about, &runs)?.concat());
+        let change = |term: Term| {
+            let residuals = self.estimator.residuals_of(&with(about, [term.clone()]), &runs).ok()?;
+            Some((term, DVector::from_vec(residuals.concat()) - &plain))
         };
-        let columns: Vec<(Term, DVector<f64>)> = starts.into_par_iter().filter_map(column).collect();
+        Ok(starts.into_par_iter().filter_map(change).collect())
+    }
+
+    /// Linear estimates of how far every start would lower χ² of `from`, beyond a refit of its own coordinates. `from` is the model of the responses, or
+    /// that one without its term `removed`: what candidates do hardly depends on it. `more` starts belong to `from` itself.
+    pub(super) fn screened(&self, from: &Scored, responses: &Responses, removed: Option<usize>, more: &Changes) -> Screened {
+        let (base, candidates) = (from.model(), self.estimator.plant.candidates());
+        let of_base = coordinates(&responses.about).into_iter().zip(&responses.derivatives);
+        let derivatives: Derivatives =
+            of_base.filter(|((term, _), _)| Some(*term) != removed).map(|(_, column)| column.clone()).collect();
+        let own = tangents(&derivatives);
+        let rest = without_directions(&own, &joined(from, &self.split.all()));
+        let column = |(term, change): &(Term, DVector<f64>)| {
+            let column = without_directions(&own, change);
+            (column.norm_squared() > 1e-12).then_some((term.clone(), column))
+        };
+        let columns: Changes = responses.starts.par_iter().chain(more).filter_map(column).collect();
         let mut ranked = Vec::new();
         for (candidate, _) in candidates.iter().enumerate().filter(|(_, c)| c.is_free_form) {
             let own: Vec<_> = columns.iter().filter(|(term, _)| term.candidate == candidate).collect();
@@ -483,7 +531,7 @@ impl Search<'_> {
         }
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (residuals, terms) = (from.residuals.clone(), base.terms.len());
-        Ok(Screened { ranked, columns, rest, tangents: own, derivatives, residuals, terms })
+        Screened { ranked, columns, rest, tangents: own, derivatives, residuals, terms }
     }
 
     /// The linear estimate of a free form's weights within their bounds, with the fall of χ²: least squares of −`rest` on the `columns` of its starts,
@@ -491,11 +539,7 @@ impl Search<'_> {
     fn free_start(&self, columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Option<(f64, Term)> {
         let mut kept: Vec<&(Term, DVector<f64>)> = columns.to_vec();
         while let Some((first, _)) = kept.first() {
-            let n = kept.len();
-            let mut information = DMatrix::from_fn(n, n, |i, j| kept[i].1.dot(&kept[j].1));
-            (0..n).for_each(|k| information[(k, k)] *= 1.0 + 1e-6);
-            let right = DVector::from_fn(n, |k, _| -kept[k].1.dot(rest));
-            let weights = information.lu().solve(&right)?;
+            let (gain, weights) = least_squares(&kept, rest)?;
             let mut term = Term { candidate: first.candidate, x: vec![0.0; first.x.len()] };
             for ((start, _), weight) in kept.iter().zip(weights.iter()) {
                 term.x.iter_mut().zip(&start.x).for_each(|(x, by)| *x += weight * by);
@@ -506,11 +550,11 @@ impl Search<'_> {
                 let [low, high] = parameters[at].bounds;
                 (low - term.x[at]).max(term.x[at] - high) / parameters[at].scale
             };
-            match (0..n).filter(|k| excess(*k) > 0.0).max_by(|a, b| excess(*a).total_cmp(&excess(*b))) {
+            match (0..kept.len()).filter(|k| excess(*k) > 0.0).max_by(|a, b| excess(*a).total_cmp(&excess(*b))) {
                 Some(worst) => {
                     kept.remove(worst);
                 }
-                None => return Some((right.dot(&weights), term)),
+                None => return Some((gain, term)),
             }
         }
         None
@@ -676,7 +720,7 @@ impl Search<'_> {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
         if own.is_variant {
-            return self.with_its_plain_law(scored, index);
+            return Ok(self.with_its_plain_law(scored, index));
         }
         let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
@@ -706,15 +750,12 @@ impl Search<'_> {
         Ok(if self.is_significant(&best, &scored) { best } else { scored })
     }
 
-    /// The model with the plain law of the cause of term `index`, unless its own law is significantly better.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if the plain law cannot be fitted.
-    pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
+    /// The model with the plain law of the cause of term `index`, unless its own law is significantly better or the plain one cannot be fitted.
+    pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Scored {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
         if !own.is_variant {
-            return Ok(scored);
+            return scored;
         }
         let of_plain = |candidate: usize| {
             let plain = &self.estimator.plant.candidates()[candidate];
@@ -722,12 +763,14 @@ impl Search<'_> {
             let x = plain.parameters.iter().map(at).collect::<Option<Vec<f64>>>()?;
             (plain.id == own.id && !plain.is_variant).then_some(Term { candidate, x })
         };
-        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return Ok(scored) };
+        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return scored };
         (self.progress)(&format!("the plain law of {}", own.id));
         let mut model = scored.model().clone();
         model.terms[index] = plain;
-        let plain = self.fitted_at_its_spread(&model)?;
-        Ok(if self.is_significant(&scored, &plain) { scored } else { plain })
+        match self.fitted_at_its_spread(&model) {
+            Ok(plain) if !self.is_significant(&scored, &plain) => plain,
+            _ => scored,
+        }
     }
 
     /// Sets what re-tuned constants leave to what `constants` leaves.
@@ -904,15 +947,20 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
+        (self.progress)("screening all candidates beside the causes");
+        let responses = self.responses(best.model(), |candidate| !candidate.is_free_form)?;
         for (index, removed) in best.model().terms.iter().enumerate() {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
             let without = self.without(best, index).and_then(|model| self.ranked_at_its_spread(&model));
             let Ok(without) = without else { continue };
-            let screened = self.screen_of(&without, |candidate| !candidate.is_free_form)?;
-            let is_other = |m: &Model| m.terms.last().is_some_and(|term| term.candidate != removed.candidate);
+            // Other laws of a cause cannot be tried beside it.
+            let laws = self.changes(without.model(), |other, c| {
+                !c.is_free_form && c.id == self.id(removed.candidate) && other != removed.candidate
+            })?;
+            let screened = self.screened(&without, &responses, Some(index), &laws);
             let own = without.total() - best.total();
-            let is_promising = |(gain, m): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own && is_other(m);
+            let is_promising = |(gain, _): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own;
             // One law of each cause: the others are tried once it has the place.
             for model in first_of_each(screened.ranked.iter().filter(is_promising), most, |term| self.id(term.candidate)) {
                 let Some(term) = model.terms.last() else { continue };
@@ -978,6 +1026,16 @@ fn first_of_each<'m, K: PartialEq>(
         }
     }
     chosen
+}
+
+/// Least squares of −`rest` on the columns of starts: the fall of χ², and the weights; none without columns.
+fn least_squares(columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
+    let n = columns.len();
+    let mut information = DMatrix::from_fn(n, n, |i, j| columns[i].1.dot(&columns[j].1));
+    (0..n).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
+    let right = DVector::from_fn(n, |k, _| -columns[k].1.dot(rest));
+    let weights = information.lu().solve(&right).filter(|_| n > 0)?;
+    Some((right.dot(&weights), weights))
 }
 
 /// The residuals of runs, one after the other.
@@ -1099,7 +1157,14 @@ mod tests {
                 fixed: Vec::new(),
                 starts: vec![vec![1.0]],
             };
-            Self { signals: (0..6).map(signal).collect(), candidates: ["other", "first", "second"].map(candidate).to_vec() }
+            let mut candidates = ["other", "first", "second"].map(candidate).to_vec();
+            // Another law of the second cause, with a part of the other one.
+            let mut variant = candidate("second");
+            variant.is_variant = true;
+            variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
+            variant.starts = vec![vec![1.0, 1.0]];
+            candidates.push(variant);
+            Self { signals: (0..6).map(signal).collect(), candidates }
         }
     }
 
@@ -1126,21 +1191,21 @@ mod tests {
             run: usize,
             _nuisance: &crate::diagnose::plant::Nuisance,
         ) -> Result<Vec<f64>, DiagnoseError> {
-            let of = |term: &Term, at| term.x[0] * wave(self.candidates[term.candidate].id, run, at);
+            let of = |term: &Term, at| {
+                let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
+                term.x[0] * wave(self.candidates[term.candidate].id, run, at) + more
+            };
             Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
         }
     }
 
+    fn search(plant: &Waves) -> Search<'_> {
+        let split = split(plant, &[Role::Auto; 6]);
+        Search { estimator: Estimator::new(plant), split, unexplained: 0.0, limit: f64::INFINITY, progress: &|_: &str| {} }
+    }
+
     fn found(plant: &Waves) -> Vec<&'static str> {
-        let progress = |_: &str| {};
-        let estimator = Estimator::new(plant);
-        let mut search = Search {
-            estimator,
-            split: split(plant, &[Role::Auto; 6]),
-            unexplained: 0.0,
-            limit: f64::INFINITY,
-            progress: &progress,
-        };
+        let mut search = search(plant);
         let plain = search.calibrated(1.0).unwrap();
         let (best, _) = search.forward(plain).unwrap();
         best.model().terms.iter().map(|term| search.id(term.candidate)).collect()
@@ -1159,5 +1224,17 @@ mod tests {
         assert_eq!(found(&Waves::new(&[("other", 1.0)])), ["other"]);
         assert_eq!(found(&Waves::new(&[("first", 1.0)])), ["first"]);
         assert!(found(&Waves::new(&[])).is_empty());
+    }
+
+    #[test]
+    fn a_law_with_a_further_parameter_gives_way_where_it_is_not_needed() {
+        for (other, stays) in [(0.0, false), (1.0, true)] {
+            let plant = Waves::new(&[("second", 5.0), ("other", other)]);
+            let search = search(&plant);
+            let scored = search.fitted(&Model::new(vec![Term { candidate: 3, x: vec![1.0, 1.0] }], 1.0, false)).unwrap();
+            let term = search.with_its_plain_law(scored, 0).model().terms[0].clone();
+            assert_eq!(term.x.len() == 2, stays, "{term:?}");
+            assert!((term.x[0] - 5.0).abs() < 0.2, "{term:?}");
+        }
     }
 }

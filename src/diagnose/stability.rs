@@ -2,7 +2,6 @@
 
 use nalgebra::DVector;
 
-use super::DiagnoseError;
 use super::fit::sum_of_squares;
 use super::plant::{Candidate, Model, Term};
 use super::search::{LEAST_GAIN, Scored, Screened, Search, Trial, joined, without_directions};
@@ -26,47 +25,35 @@ pub(super) struct Standing {
     pub(super) is_left_by_law: bool,
 }
 
-/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by linear estimates.
-///
-/// # Errors
-/// [`DiagnoseError`] if the model cannot be simulated.
-pub(super) fn standing(
-    search: &Search,
-    best: &Scored,
-    without: &Scored,
-    index: usize,
-    fitted: &[&Trial],
-) -> Result<(Standing, Screened), DiagnoseError> {
+/// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by the linear estimates of
+/// a screening of each of the two.
+pub(super) fn standing(search: &Search, [best, without]: [(&Scored, &Screened); 2], index: usize, fitted: &[&Trial]) -> Standing {
     // Free forms count in the stead of constants only.
-    let is_constant = search.candidate(&best.model().terms[index]).is_constant;
-    let screened =
-        search.screen_of(without, |candidate| if candidate.is_free_form { is_constant } else { !candidate.is_variant })?;
-    let is_left_by_law = is_constant && is_left_by_law(search, best, without, index, &screened)?;
+    let is_constant = search.candidate(&best.0.model().terms[index]).is_constant;
+    let is_left_by_law = is_constant && is_left_by_law(search, best, without, index);
     let runs = search.split.all();
     if runs.len() < LEAST_RUNS {
-        return Ok((Standing { stability: None, needs: Vec::new(), is_left_by_law }, screened));
+        return Standing { stability: None, needs: Vec::new(), is_left_by_law };
     }
-    let contest = Contest::new(search, best, without, index, &screened, fitted);
+    let contest = Contest::new(search, best.0, without, index, fitted);
     let resamples: Vec<[usize; 2]> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).collect();
     let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..])).count();
     let places = |fold: &[usize]| -> Vec<usize> { (0..runs.len()).filter(|at| fold.contains(&runs[*at])).collect() };
     let folds = search.split.folds();
     let is_lost_without = |fold: &usize| !contest.shows(&places(&folds[*fold]));
-    let standing = Standing {
+    Standing {
         stability: Some(chosen as f64 / resamples.len() as f64),
         needs: (0..folds.len()).filter(is_lost_without).collect(),
         is_left_by_law,
-    };
-    Ok((standing, screened))
+    }
 }
 
 fn is_left_by_law(
     search: &Search,
-    best: &Scored,
-    without: &Scored,
+    (best, beside): (&Scored, &Screened),
+    (without, screened): (&Scored, &Screened),
     index: usize,
-    screened: &Screened,
-) -> Result<bool, DiagnoseError> {
+) -> bool {
     let own = search.candidate(&best.model().terms[index]);
     let others = || without.model().terms.iter().map(|term| search.candidate(term)).filter(|other| !other.is_constant);
     let is_law = |free: &Candidate| {
@@ -79,7 +66,7 @@ fn is_left_by_law(
         screened.ranked.iter().filter(of_law).map(|(gain, _)| *gain).fold(0.0, f64::max)
     };
     let gain = without.total() - best.total();
-    Ok(most(screened) > TAKEN_BY_LAW * gain && most(&search.screen_of(best, is_law)?) > LEFT_BY_CONSTANT * gain)
+    most(screened) > TAKEN_BY_LAW * gain && most(beside) > LEFT_BY_CONSTANT * gain
 }
 
 /// What a cause and its rivals take, run by run.
@@ -97,7 +84,7 @@ struct Contest {
 }
 
 impl Contest {
-    fn new(search: &Search, best: &Scored, without: &Scored, index: usize, screened: &Screened, fitted: &[&Trial]) -> Self {
+    fn new(search: &Search, best: &Scored, (without, screened): (&Scored, &Screened), index: usize, fitted: &[&Trial]) -> Self {
         let runs = search.split.all();
         let own = search.candidate(&best.model().terms[index]);
         let is_rival = |candidate: usize| {

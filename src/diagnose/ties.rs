@@ -102,7 +102,8 @@ pub(super) fn pair_in_place(
     let Some(pair) = search.pair(without.model(), screened, PROMISING_PAIR * taken, is_wanted) else { return Ok(None) };
     (search.progress)(&format!("two causes in the place of {}", own.id));
     let start = search.start_beyond(&pair, screened)?;
-    let Ok(both) = search.fitted_at_its_spread(&start) else { return Ok(None) };
+    let near = search.ranked_at_its_spread(&start).ok().filter(|both| both.total() < best.total() + NEAR_TIE);
+    let Some(both) = near.and_then(|near| search.fitted_at_its_spread(near.model()).ok()) else { return Ok(None) };
     let ids: Vec<&str> = pair.terms.iter().rev().take(2).map(|term| search.id(term.candidate)).collect();
     let set = format!("{}+{}", ids[1].min(ids[0]), ids[1].max(ids[0]));
     Ok(search.is_tied(best, &both).then(|| (set, both.model().clone())))

@@ -114,6 +114,7 @@ impl JointExtensions {
     /// Moment against the rates (rad/s) of quad `k`'s joints, and its derivative.
     #[inline(always)]
     fn resisting_at(&self, k: usize, rate: Lanes) -> [Lanes; 2] {
+        // As `Extensions::friction`.
         let Extensions { dry_friction, moment_of_rate, .. } = &self.extensions;
         let share = if *dry_friction == 0.0 { Lanes::ZERO } else { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() };
         let moment = Lanes::splat(*dry_friction) * share;
@@ -240,7 +241,8 @@ impl JointExtensions {
     #[inline(always)]
     fn friction(&self, k: usize) -> [Lanes; 2] {
         let ([moment, slope], rate) = (self.resisting[k], self.rates[k]);
-        if self.repetitions <= NEWTON {
+        // A curve of the rate alone is smooth.
+        if self.repetitions < NEWTON || !self.is_repeated() {
             // A curve of the rate is 0 at rest, too.
             let turned = Lanes::splat(0.5) - self.turned[k];
             return [
@@ -249,7 +251,7 @@ impl JointExtensions {
             ];
         }
         let moves = rate.abs() - Lanes::splat(1e-6 * DRY_FRICTION_RATE);
-        [moment.over(rate).where_positive(moves, slope), Lanes::ZERO]
+        [(moment / rate).where_positive(moves, slope), Lanes::ZERO]
     }
 
     /// Adds the extra torques, linearised about the last rates, to the joints: their impulses over `share` (s).
