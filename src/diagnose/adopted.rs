@@ -65,7 +65,7 @@ fn weighed(
     (search.progress)(&format!("the gain of {}", search.id(best.model().terms[index].candidate)));
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let mut tied_with = ties.of(search, best, index);
-    let without_it = search.screened(&without, responses, Some(index), &Vec::new());
+    let without_it = search.screened(&without, responses, Some(index));
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
     let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with)?.unzip();
     tied_with.extend(set);
@@ -97,8 +97,8 @@ pub(super) fn adopted(
     let terms = &best.model().terms;
     // Free forms count in the stead of constants only.
     let has_constants = terms.iter().any(|term| search.candidate(term).is_constant);
-    let responses = search.responses(best.model(), |c| if c.is_free_form { has_constants } else { !c.is_variant })?;
-    let screened = search.screened(best, &responses, None, &Vec::new());
+    let responses = search.responses(best.model(), |_, c| if c.is_free_form { has_constants } else { !c.is_variant })?;
+    let screened = search.screened(best, &responses, None);
     let weighed: Vec<Weighed> = (0..terms.len())
         .map(|index| weighed(search, (best, &screened), index, ties, &responses))
         .collect::<Result<_, DiagnoseError>>()?;

@@ -44,6 +44,8 @@ const FREE_FINALISTS: usize = 3;
 const PROMISING: f64 = 0.02;
 const PROMISING_FREE: f64 = 0.4;
 pub(super) const PROMISING_IN_PLACE: f64 = 0.3;
+/// Candidates are screened in the place of a cause whose linear estimate from what they do beside it is at least this share of its own.
+const LIKELY_IN_PLACE: f64 = 0.15;
 /// Terms that are left out on trial in a round of elimination, the least significant ones.
 const LEAST_SIGNIFICANT: usize = 3;
 /// Share of the diagonal by which the linear estimate of a start is regularised.
@@ -474,39 +476,38 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub(super) fn screen_of(&self, from: &Scored, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Screened, DiagnoseError> {
-        Ok(self.screened(from, &self.responses(from.model(), is_wanted)?, None, &Vec::new()))
+        Ok(self.screened(from, &self.responses(from.model(), |_, c| is_wanted(c))?, None))
     }
 
-    /// What the coordinates of a model and those candidates that are wanted do, with the time steps of the search.
+    /// What the coordinates of a model do, and those candidates that are wanted and not in it yet, with the time steps of the search.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
-    pub(super) fn responses(&self, about: &Model, is_wanted: impl Fn(&Candidate) -> bool) -> Result<Responses, DiagnoseError> {
-        let about = Model { fine: false, ..about.clone() };
-        let derivatives = self.estimator.derivatives(&about, &self.split.all())?;
-        let starts = self.changes(&about, |_, c| is_wanted(c))?;
-        Ok(Responses { about, derivatives, starts })
-    }
-
-    /// The change of the residuals by every start of those candidates that are wanted and not in the model yet.
-    fn changes(&self, about: &Model, is_wanted: impl Fn(usize, &Candidate) -> bool) -> Result<Changes, DiagnoseError> {
+    pub(super) fn responses(
+        &self,
+        about: &Model,
+        is_wanted: impl Fn(usize, &Candidate) -> bool,
+    ) -> Result<Responses, DiagnoseError> {
         let runs = self.split.all();
+        let about = Model { fine: false, ..about.clone() };
         let used: Vec<&str> = about.terms.iter().map(|term| self.id(term.candidate)).collect();
         let candidates = self.estimator.plant.candidates().iter().enumerate();
         let wanted = candidates.filter(|(index, c)| is_wanted(*index, c) && !used.contains(&c.id));
         let starts: Vec<Term> =
             wanted.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
-        let plain = DVector::from_vec(self.estimator.residuals_of(about, &runs)?.concat());
+        let derivatives = self.estimator.derivatives(&about, &runs)?;
+        let plain = DVector::from_vec(self.estimator.residuals_of(&about, &runs)?.concat());
         let change = |term: Term| {
-            let residuals = self.estimator.residuals_of(&with(about, [term.clone()]), &runs).ok()?;
+            let residuals = self.estimator.residuals_of(&with(&about, [term.clone()]), &runs).ok()?;
             Some((term, DVector::from_vec(residuals.concat()) - &plain))
         };
-        Ok(starts.into_par_iter().filter_map(change).collect())
+        let starts = starts.into_par_iter().filter_map(change).collect();
+        Ok(Responses { about, derivatives, starts })
     }
 
     /// Linear estimates of how far every start would lower χ² of `from`, beyond a refit of its own coordinates. `from` is the model of the responses, or
-    /// that one without its term `removed`: what candidates do hardly depends on it. `more` starts belong to `from` itself.
-    pub(super) fn screened(&self, from: &Scored, responses: &Responses, removed: Option<usize>, more: &Changes) -> Screened {
+    /// that one without its term `removed`: then the estimates are rough, as near resonance what a candidate does depends on what is there already.
+    pub(super) fn screened(&self, from: &Scored, responses: &Responses, removed: Option<usize>) -> Screened {
         let (base, candidates) = (from.model(), self.estimator.plant.candidates());
         let of_base = coordinates(&responses.about).into_iter().zip(&responses.derivatives);
         let derivatives: Derivatives =
@@ -517,7 +518,7 @@ impl Search<'_> {
             let column = without_directions(&own, change);
             (column.norm_squared() > 1e-12).then_some((term.clone(), column))
         };
-        let columns: Changes = responses.starts.par_iter().chain(more).filter_map(column).collect();
+        let columns: Changes = responses.starts.par_iter().filter_map(column).collect();
         let mut ranked = Vec::new();
         for (candidate, _) in candidates.iter().enumerate().filter(|(_, c)| c.is_free_form) {
             let own: Vec<_> = columns.iter().filter(|(term, _)| term.candidate == candidate).collect();
@@ -948,18 +949,20 @@ impl Search<'_> {
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         (self.progress)("screening all candidates beside the causes");
-        let responses = self.responses(best.model(), |candidate| !candidate.is_free_form)?;
+        let responses = self.responses(best.model(), |_, candidate| !candidate.is_free_form)?;
         for (index, removed) in best.model().terms.iter().enumerate() {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
             let without = self.without(best, index).and_then(|model| self.ranked_at_its_spread(&model));
             let Ok(without) = without else { continue };
-            // Other laws of a cause cannot be tried beside it.
-            let laws = self.changes(without.model(), |other, c| {
-                !c.is_free_form && c.id == self.id(removed.candidate) && other != removed.candidate
-            })?;
-            let screened = self.screened(&without, &responses, Some(index), &laws);
+            // What candidates do beside the cause leads to those that are worth a screening without it; other laws of a cause cannot be tried beside it.
             let own = without.total() - best.total();
+            let beside = self.screened(&without, &responses, Some(index));
+            let likely = beside.ranked.iter().take_while(|(gain, _)| *gain >= LIKELY_IN_PLACE * own);
+            let likely: Vec<usize> = likely.filter_map(|(_, model)| Some(model.terms.last()?.candidate)).collect();
+            let is_law = |c: &Candidate| c.id == self.id(removed.candidate) && !c.is_free_form;
+            let is_likely = |at: usize, c: &Candidate| at != removed.candidate && (likely.contains(&at) || is_law(c));
+            let screened = self.screened(&without, &self.responses(without.model(), is_likely)?, None);
             let is_promising = |(gain, _): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own;
             // One law of each cause: the others are tried once it has the place.
             for model in first_of_each(screened.ranked.iter().filter(is_promising), most, |term| self.id(term.candidate)) {
