@@ -382,7 +382,7 @@ fn effects_are_listed_with_their_parameters() {
     let text = String::from_utf8(sfers(folder.path(), &["effects"]).stdout).unwrap();
     assert!(text.contains("hysteresis (actuation)") && text.contains("mass_g (g)"));
     let json: Value = serde_json::from_slice(&sfers(folder.path(), &["effects", "--json"]).stdout).unwrap();
-    assert_eq!(json["effects"].as_array().unwrap().len(), 47);
+    assert_eq!(json["effects"].as_array().unwrap().len(), 51);
 }
 
 /// Two runs of a sample with `rows` rows, one of every `step`, and the height of one marker alone.

@@ -55,7 +55,7 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 24] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 28] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
@@ -73,6 +73,19 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 24] = [
     ("stiffness-softening", &[("softening_mm2", 2000.0), ("exponent", 1.0)]),
     ("structural-damping", &[("loss_factor", 0.05), ("exponent", 0.3)]),
     ("dry-friction", &[("moment_mn_m", 0.3), ("presliding_per_m", 0.5)]),
+    ("free-stiffness-along", &[("change_1", -0.4), ("change_3", 0.5), ("change_5", 1.0)]),
+    ("free-clamp", &[("range_mn_m", 4.0), ("compliance_1_rad_per_n_m", 2.0), ("compliance_3_rad_per_n_m", 0.5)]),
+    ("free-clamp", &[("range_mn_m", 4.0), ("compliance_2_rad_per_n_m", 2.0), ("compliance_4_rad_per_n_m", 1.0)]),
+    (
+        "free-clamp",
+        &[
+            ("compliance_1_rad_per_n_m", 2.0),
+            ("compliance_2_rad_per_n_m", 1.5),
+            ("compliance_3_rad_per_n_m", 1.2),
+            ("compliance_4_rad_per_n_m", 1.0),
+            ("damping_s", 5e-3),
+        ],
+    ),
     ("clamp-shift", &[("compliance_mm_per_n", 20.0)]),
     ("clamp-shift", &[("compliance_mm_per_n", 20.0), ("damping_s", 5e-3)]),
     ("cable-drag", &[("stiffness_n_per_m", 20.0), ("level_mm", -3.0)]),
@@ -99,6 +112,9 @@ fn a_cantilever_moves_as_on_the_planar_engine() {
             "free-moment-of-rate" => 3e-5,
             // Seen: 1.24e-5 with a damper.
             "clamp-compliance" if values.len() > 1 => 3e-5,
+            // Seen: 1.5e-4 and 8.5e-5 where parts of the curve are rigid, so that Bullet's error is not quite of first order; 1.5e-5 with a damper.
+            "free-clamp" if values.len() > 3 => 3e-5,
+            "free-clamp" => 3e-4,
             _ => 1e-5,
         };
         assert!(apart < limit * largest, "{id} {values:?}: {apart:e} of {largest}");
@@ -107,7 +123,7 @@ fn a_cantilever_moves_as_on_the_planar_engine() {
 
 #[test]
 fn a_cantilever_rests_as_on_the_planar_engine() {
-    for (id, values) in &ON_A_CANTILEVER[..6] {
+    for (id, values) in ON_A_CANTILEVER[..6].iter().chain(&ON_A_CANTILEVER[17..20]) {
         let robot = cantilever(0.03, id, values);
         let mut bullet = BulletEngine::new(&robot, 1e-5).unwrap();
         step(&mut bullet, &[-600.0], 150_000);
@@ -261,6 +277,53 @@ fn static_friction_holds_up_to_its_own_angle_and_sliding_takes_it_away() {
     }
 }
 
+/// Speed (cm/s) after `time` (s) of a body that slides with friction μ(v) on a level floor: Runge and Kutta's rule in steps of 1e-6 s.
+fn slowed(mu: impl Fn(f64) -> f64, start: f64, time: f64) -> f64 {
+    let (mut v, h) = (start, 1e-6);
+    for _ in 0..(time / h).round() as u64 {
+        let rate = |v: f64| -GRAVITY * mu(v);
+        let k1 = rate(v);
+        let k2 = rate(v + 0.5 * h * k1);
+        let k3 = rate(v + 0.5 * h * k2);
+        let k4 = rate(v + h * k3);
+        v += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    }
+    v
+}
+
+#[test]
+fn a_free_curve_of_friction_slows_as_it_says_and_holds_the_named_laws() {
+    let (mu, start, time) = (0.2, 20.0, 0.05);
+    let changes = |of: &dyn Fn(f64) -> f64| -> Vec<(&'static str, f64)> {
+        let speeds = [0.0, 20.0 / 27.0, 20.0 / 9.0, 20.0 / 3.0, 20.0];
+        let names = ["change_1", "change_2", "change_3", "change_4", "change_5"];
+        names.into_iter().zip(speeds).map(|(name, v)| (name, of(v))).chain([("range_mm_s", 200.0)]).collect()
+    };
+    let law = |v: f64| 0.5 - 0.06 * v;
+    let robot = on_the_floor(mu, "free-floor-friction", &changes(&law));
+    let expected = slowed(|v| mu * (1.0 + law(v)), start, time);
+    for (engine, [_, v]) in slide(&robot, 0.0, start, time).into_iter().enumerate() {
+        // Of first order: both engines take the speed at a step's start. Seen: 2.0e-5 and 1.3e-4.
+        assert!((v / expected - 1.0).abs() < 2e-4, "{engine}: {v}, not {expected}");
+    }
+    let equal = slide(&on_the_floor(mu, "free-floor-friction", &changes(&|_| 0.25)), 0.0, start, time);
+    let named = slide(&on_the_floor(mu, "ground-friction", &[("scale", 1.25)]), 0.0, start, time);
+    for ([_, a], [_, b]) in equal.into_iter().zip(named) {
+        // Seen: equal bits.
+        assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
+    }
+    // Stribeck's curve with a speed of 5 cm/s through points of the free one, which a fit need not pass through.
+    let stribeck = |v: f64| 0.4 * (-(v / 5.0) * (v / 5.0)).exp();
+    let (start, time) = (11.0, 0.04);
+    let lines = slide(&on_the_floor(mu, "free-floor-friction", &changes(&stribeck)), 0.0, start, time);
+    let named = slide(&on_the_floor(mu, "stick-slip", &[("static_ratio", 1.4), ("stribeck_speed_mm_s", 50.0)]), 0.0, start, time);
+    let plain = slowed(|_| mu, start, time);
+    for ([_, a], [_, b]) in lines.into_iter().zip(named) {
+        // Between points at 2.2, 6.7 and 20 cm/s the lines lie above the curve. Seen: 30 % of what it slows beyond the plain coefficient.
+        assert!((a - b).abs() < 0.35 * (b - plain).abs() && b < plain, "{a} {b} {plain}");
+    }
+}
+
 #[test]
 fn viscous_friction_slows_every_link_on_the_floor() {
     // M v' = −μ M g − 6 F v.
@@ -327,32 +390,37 @@ fn a_jump_with_all_of_them_goes_on_from_a_saved_state_with_the_same_bits() {
 
 #[test]
 fn a_clamp_that_turns_and_shifts_moves_as_on_the_planar_engine_and_goes_on_from_a_saved_state() {
-    let mut robot = cantilever(0.008, "clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("damping_s", 1e-3)]);
-    robot.extensions.clamp_shift = 2e-5;
-    robot.extensions.clamp_shift_damping = 1e-3;
-    let bullet = |h: f64| motion(&mut BulletEngine::new(&robot, h).unwrap(), h);
-    let limit: Vec<f64> = bullet(2e-5).iter().zip(bullet(1e-5)).map(|(coarse, fine)| 2.0 * fine - coarse).collect();
-    let planar = motion(&mut PlanarEngine::new(&robot, 1e-5).unwrap(), 1e-5);
-    let largest = planar.iter().fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
-    let apart = planar.iter().zip(&limit).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    // Seen: 4.2e-6.
-    assert!(apart < 1e-5 * largest, "{apart:e} of {largest}");
-    let new = |planar: bool| -> Box<dyn Engine> {
-        if planar {
-            Box::new(PlanarEngine::new(&robot, 1e-4).unwrap())
-        } else {
-            Box::new(BulletEngine::new(&robot, 1e-5).unwrap())
+    let hinge: &[(&str, f64)] = &[("compliance_rad_per_n_m", 2.0), ("damping_s", 1e-3)];
+    let curve: &[(&str, f64)] =
+        &[("range_mn_m", 4.0), ("compliance_1_rad_per_n_m", 2.0), ("compliance_3_rad_per_n_m", 0.5), ("damping_s", 1e-3)];
+    for (id, values, most) in [("clamp-compliance", hinge, 1e-5), ("free-clamp", curve, 5e-5)] {
+        let mut robot = cantilever(0.008, id, values);
+        robot.extensions.clamp_shift = 2e-5;
+        robot.extensions.clamp_shift_damping = 1e-3;
+        let bullet = |h: f64| motion(&mut BulletEngine::new(&robot, h).unwrap(), h);
+        let limit: Vec<f64> = bullet(2e-5).iter().zip(bullet(1e-5)).map(|(coarse, fine)| 2.0 * fine - coarse).collect();
+        let planar = motion(&mut PlanarEngine::new(&robot, 1e-5).unwrap(), 1e-5);
+        let largest = planar.iter().fold(0.0_f64, |largest, angle| largest.max(angle.abs()));
+        let apart = planar.iter().zip(&limit).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // Seen: 4.2e-6 and 2.1e-5.
+        assert!(apart < most * largest, "{id}: {apart:e} of {largest}");
+        let new = |planar: bool| -> Box<dyn Engine> {
+            if planar {
+                Box::new(PlanarEngine::new(&robot, 1e-4).unwrap())
+            } else {
+                Box::new(BulletEngine::new(&robot, 1e-5).unwrap())
+            }
+        };
+        for planar in [true, false] {
+            let mut engine = new(planar);
+            step(engine.as_mut(), &[-600.0], 500);
+            let state = engine.save().unwrap();
+            step(engine.as_mut(), &[-600.0], 500);
+            let mut fresh = new(planar);
+            fresh.load(500, &state).unwrap();
+            step(fresh.as_mut(), &[-600.0], 500);
+            assert_eq!(fresh.save().unwrap(), engine.save().unwrap(), "{id} {planar}");
         }
-    };
-    for planar in [true, false] {
-        let mut engine = new(planar);
-        step(engine.as_mut(), &[-600.0], 500);
-        let state = engine.save().unwrap();
-        step(engine.as_mut(), &[-600.0], 500);
-        let mut fresh = new(planar);
-        fresh.load(500, &state).unwrap();
-        step(fresh.as_mut(), &[-600.0], 500);
-        assert_eq!(fresh.save().unwrap(), engine.save().unwrap(), "{planar}");
     }
 }
 
@@ -373,6 +441,8 @@ fn a_clamp_that_gives_goes_on_from_a_saved_state_with_the_same_bits() {
     assert!(BulletEngine::new(&softer, 1e-5).unwrap().load(1000, &state).is_err());
     let harder = cantilever(0.008, "clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("hardening_per_rad", 300.0)]);
     assert!(BulletEngine::new(&harder, 1e-5).unwrap().load(1000, &state).is_err());
+    let curved = cantilever(0.008, "free-clamp", &[("compliance_1_rad_per_n_m", 2.0)]);
+    assert!(BulletEngine::new(&curved, 1e-5).unwrap().load(1000, &state).is_err());
     // The planar engine starts its next step from the root's last rate.
     let new = || PlanarEngine::new(&harder, 1e-4).unwrap();
     let mut engine = new();

@@ -12,6 +12,7 @@ use sfers::diagnose::extended;
 use sfers::diagnose::plant::{Model, Nuisance, Plant, Term};
 use sfers::diagnose::quality;
 use sfers::diagnose::robot::RobotPlant;
+use sfers::effects::View;
 use sfers::experiment::{self, Control, Source};
 
 /// Agreement (mm): rounding of results that are computed alike.
@@ -40,6 +41,16 @@ fn nuisance(plant: &RobotPlant) -> Nuisance {
     Nuisance { shares: vec![0.4; plant.nuisances(0)], ..Nuisance::default() }
 }
 
+/// The place (cm) that `view` shows at `seen` (cm), for views that change places little.
+fn place_of(view: &View, seen: [f64; 2]) -> [f64; 2] {
+    let mut place = seen;
+    for _ in 0..50 {
+        let shown = view.of(place);
+        place = [0, 1].map(|axis| place[axis] + seen[axis] - shown[axis]);
+    }
+    place
+}
+
 /// The largest difference (mm) between what the plant predicts and what the experiment file's recording shows, both at the run's rows.
 fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) -> Result<f64, Box<dyn std::error::Error>> {
     let nuisance = nuisance(plant);
@@ -61,6 +72,7 @@ fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) ->
         along += segment.length;
     }
     places.push(along);
+    let view = View::new(&experiment.effects);
     let mut worst = 0.0_f64;
     for (i, signal) in predicted.iter().enumerate() {
         let (t, channel) = (plant.signals()[0].times[i], plant.signals()[0].channels[i]);
@@ -68,11 +80,13 @@ fn apart(folder: &Path, dataset: &Dataset, plant: &RobotPlant, model: &Model) ->
         let position = plant.markers()[channel / 2];
         let body = (0..nodes - 1).rev().find(|body| places[*body] < position).unwrap_or(0);
         let share = (position - places[body]) / (places[body + 1] - places[body]);
-        let axis = 2 * (channel % 2);
-        let between = |of: &dyn Fn(usize) -> f64| of(body) + share * (of(body + 1) - of(body));
-        let shift = if axis == 0 { 0.5 * segments[0].length } else { 0.0 };
-        let view = between(&|node| recording.node(record, node)[axis]) + shift;
-        worst = worst.max((10.0 * view - signal).abs());
+        // Links are straight, but not in a picture that is bent: a marker lies between the true places of two nodes, from the left end.
+        let [left, right] = [body, body + 1].map(|node| {
+            let [x, _, z] = recording.node(record, node);
+            place_of(&view, [x + 0.5 * segments[0].length, z])
+        });
+        let seen = view.of([0, 1].map(|axis| left[axis] + share * (right[axis] - left[axis])));
+        worst = worst.max((10.0 * seen[channel % 2] - signal).abs());
     }
     Ok(worst)
 }
@@ -137,6 +151,27 @@ fn a_drift_is_another_constant_in_each_run_in_the_order_of_the_data_set() {
     let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
     let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
     assert!(plant.candidates().iter().all(|c| !c.id.ends_with("-drift")));
+}
+
+#[test]
+fn a_free_form_is_written_with_lists() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "clamped", 3, 1);
+    let dataset = Dataset::read(&folder.path().join("x.toml")).unwrap();
+    let plant = RobotPlant::new(&dataset, &quality::check(&dataset));
+    for (id, key, weights) in [
+        ("free-moment-of-rate", "moment_mn_m", vec![0.1, 0.2, 0.3, 0.4, 0.5]),
+        ("free-clamp", "compliance_rad_per_n_m", vec![0.1, 0.2, 0.3, 0.4, 0.002]),
+    ] {
+        let candidate = plant.candidates().iter().position(|c| c.id == id).unwrap();
+        let model = Model::new(vec![Term { candidate, x: weights.clone() }], 3.0, true);
+        let (toml, _) = extended::experiment(&dataset, &plant, &model, 0, &nuisance(&plant).shares);
+        let table: toml::Table = toml::from_str(&toml).unwrap();
+        let effect = &table["effect"].as_array().unwrap()[0];
+        let list: Vec<f64> = effect[key].as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+        assert_eq!(list, weights[..list.len()], "{toml}");
+        assert!(list.len() > 3 && !toml.contains("_1_"), "{toml}");
+    }
 }
 
 /// Diagnoses the single run of [`write`] and compares the file's recording with the column of residuals.csv.

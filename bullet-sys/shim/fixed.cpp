@@ -1,5 +1,7 @@
 #include "fixed.h"
 
+#include <cmath>
+
 #include "BulletDynamics/ConstraintSolver/btGeneric6DofSpring2Constraint.h"
 
 namespace bs {
@@ -20,11 +22,34 @@ FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, co
       damping_time_(damping_time),
       hardening_(hardening) {}
 
+void FixedConstraint::bend(btScalar width, const btScalar *compliances) {
+  width_ = width;
+  for (int i = 0; i < BS_CLAMP_POINTS; ++i) compliances_[i] = compliances[i];
+}
+
+void FixedConstraint::moment_of(btScalar turn, btScalar *moment, btScalar *compliance) const {
+  btScalar rest = std::abs(turn), below = 0;
+  for (int i = 0; i + 1 < BS_CLAMP_POINTS; ++i) {
+    const btScalar low = compliances_[i], high = compliances_[i + 1], whole = btScalar(0.5) * (low + high) * width_;
+    if (rest < whole) {
+      // The smaller root of low m + (high - low) m^2 / (2 width) = rest; the root is the compliance there.
+      const btScalar square = low * low + 2 * (high - low) / width_ * rest;
+      *compliance = std::sqrt(square > 0 ? square : btScalar(0));
+      *moment = std::copysign(below + 2 * rest / (low + *compliance), turn);
+      return;
+    }
+    rest -= whole;
+    below += width_;
+  }
+  *compliance = compliances_[BS_CLAMP_POINTS - 1];
+  *moment = std::copysign(below + rest / *compliance, turn);
+}
+
 void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btMultiBodyJacobianData &data,
                                            const btContactSolverInfo &info) {
   btMultiBody *body = m_bodyA;
   // A compliance is none of Bullet's.
-  if ((AS_SHIPPED && compliance_ == 0 && shift_compliance_ == 0) || !chain_.read(*body)) {
+  if ((AS_SHIPPED && is_rigid()) || !chain_.read(*body)) {
     return btMultiBodyFixedConstraint::createConstraintRows(rows, data, info);
   }
 
@@ -81,21 +106,25 @@ void FixedConstraint::createConstraintRows(btMultiBodyConstraintArray &rows, btM
     const btScalar position = -error * info.m_erp / info.m_timeStep, velocity = -row.velocity;
     out.m_rhs = position * out.m_jacDiagABInv + velocity * out.m_jacDiagABInv;
     out.m_cfm = 0;
-    if (compliance_ > 0 && i == TURN_ABOUT_Y) {
+    // Makes the row a spring of `compliance` c with a damper at the step's end: its impulse is -h (pull + whole omega) / c, omega the rate then.
+    const auto soften = [&](btScalar compliance, btScalar whole, btScalar pull) {
+      const btScalar softness = compliance / (info.m_timeStep * whole);
+      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
+      out.m_cfm = softness * out.m_jacDiagABInv;
+      out.m_rhs = (velocity - pull / whole) * out.m_jacDiagABInv;
+    };
+    if (i == TURN_ABOUT_Y && is_bent()) {
+      // phi + (h + T) omega = C(M), about the moment M* of the present turn and rate: C(M*) + c (M - M*). The impulse is -h M.
+      const btScalar rate = spin_.dot(row.angular);
+      btScalar moment, compliance;
+      moment_of(error + damping_time_ * rate, &moment, &compliance);
+      soften(compliance, info.m_timeStep + damping_time_, compliance * moment - damping_time_ * rate);
+    } else if (i == TURN_ABOUT_Y && compliance_ > 0) {
       // Of the moment and of its slope over the linear ones, at the present turn.
       const btScalar moment = 1 + hardening_ * hardening_ * error * error, slope = 3 * moment - 2;
-      const btScalar whole = slope * info.m_timeStep + damping_time_;
-      const btScalar softness = compliance_ / (info.m_timeStep * whole);
-      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
-      out.m_cfm = softness * out.m_jacDiagABInv;
-      out.m_rhs = (velocity - error * moment / whole) * out.m_jacDiagABInv;
-    }
-    if (shift_compliance_ > 0 && i == SHIFT_IN_Z) {
-      const btScalar whole = info.m_timeStep + shift_damping_time_;
-      const btScalar softness = shift_compliance_ / (info.m_timeStep * whole);
-      out.m_jacDiagABInv = btScalar(1) / (row.inverse_mass + softness);
-      out.m_cfm = softness * out.m_jacDiagABInv;
-      out.m_rhs = (velocity - error / whole) * out.m_jacDiagABInv;
+      soften(compliance_, slope * info.m_timeStep + damping_time_, error * moment);
+    } else if (i == SHIFT_IN_Z && shift_compliance_ > 0) {
+      soften(shift_compliance_, info.m_timeStep + shift_damping_time_, error);
     }
     out.m_rhsPenetration = out.m_friction = out.m_appliedImpulse = out.m_appliedPushImpulse = 0;
     out.m_lowerLimit = -m_maxAppliedImpulse;

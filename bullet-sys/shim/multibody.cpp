@@ -106,6 +106,32 @@ bool is_chain(const btMultiBody &body) {
   return body.getNumLinks() > 0;
 }
 
+void require_positive(double value, const char *message) { require(value > 0 && std::isfinite(value), message); }
+
+void require_damping_time(double value) { require(value >= 0 && std::isfinite(value), "a damping time must not be negative, and finite"); }
+
+btMultiBody &chain_of(bs_world &world, int32_t body) {
+  btMultiBody &multibody = world.multibody(body);
+  require(is_chain(multibody), "a tie that gives needs a chain");
+  return multibody;
+}
+
+// Ties the base of a chain so that it may turn about its y axis at `pivot`.
+bs::FixedConstraint &add_tie(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double hardening,
+                             double max_impulse) {
+  require(world != nullptr && pivot != nullptr, "null pointer");
+  require(max_impulse > 0, "the largest impulse must be positive");
+  require_damping_time(damping_time);
+  require(is_finite(pivot), "a pivot must be finite");
+  btMultiBody &multibody = chain_of(*world, body);
+  auto constraint = std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform(), bs::vector(pivot), compliance,
+                                                          damping_time, hardening);
+  constraint->setMaxAppliedImpulse(max_impulse);
+  world->constraints.push_back(std::move(constraint));
+  world->dynamics.addMultiBodyConstraint(world->constraints.back().get());
+  return *world->constraints.back();
+}
+
 }  // namespace
 
 void bs::Body::move_colliders() {
@@ -218,30 +244,28 @@ int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impuls
 int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double hardening,
                                  double max_impulse, char *error, int32_t error_length) {
   return bs::guarded(error, error_length, [&] {
-    require(world != nullptr && pivot != nullptr, "null pointer");
-    require(max_impulse > 0, "the largest impulse must be positive");
-    require(compliance > 0 && std::isfinite(compliance), "a compliance must be positive and finite");
-    require(damping_time >= 0 && std::isfinite(damping_time), "a damping time must not be negative, and finite");
+    require_positive(compliance, "a compliance must be positive and finite");
     require(hardening >= 0 && std::isfinite(hardening), "a hardening must not be negative, and finite");
-    require(is_finite(pivot), "a pivot must be finite");
-    btMultiBody &multibody = world->multibody(body);
-    require(is_chain(multibody), "a tie that gives needs a chain");
-    auto constraint =
-        std::make_unique<bs::FixedConstraint>(&multibody, multibody.getBaseWorldTransform(), bs::vector(pivot), compliance,
-                                              damping_time, hardening);
-    constraint->setMaxAppliedImpulse(max_impulse);
-    world->constraints.push_back(std::move(constraint));
-    world->dynamics.addMultiBodyConstraint(world->constraints.back().get());
+    add_tie(world, body, pivot, compliance, damping_time, hardening, max_impulse);
+  });
+}
+
+int32_t bs_bent_constraint_add(bs_world *world, int32_t body, const double *pivot, double width, const double *compliances, double damping_time,
+                               double max_impulse, char *error, int32_t error_length) {
+  return bs::guarded(error, error_length, [&] {
+    require(compliances != nullptr, "null pointer");
+    require_positive(width, "a width must be positive and finite");
+    for (int i = 0; i < BS_CLAMP_POINTS; ++i) require_positive(compliances[i], "a compliance must be positive and finite");
+    add_tie(world, body, pivot, 0, damping_time, 0, max_impulse).bend(width, compliances);
   });
 }
 
 int32_t bs_constraint_shift_set(bs_world *world, int32_t body, double compliance, double damping_time, char *error, int32_t error_length) {
   return bs::guarded(error, error_length, [&] {
     require(world != nullptr, "null pointer");
-    require(compliance > 0 && std::isfinite(compliance), "a compliance must be positive and finite");
-    require(damping_time >= 0 && std::isfinite(damping_time), "a damping time must not be negative, and finite");
-    btMultiBody &multibody = world->multibody(body);
-    require(is_chain(multibody), "a tie that gives needs a chain");
+    require_positive(compliance, "a compliance must be positive and finite");
+    require_damping_time(damping_time);
+    const btMultiBody &multibody = chain_of(*world, body);
     bool found = false;
     for (const auto &constraint : world->constraints) {
       if (constraint->getMultiBodyA() != &multibody) continue;

@@ -162,6 +162,10 @@ inline double fingerprint(const bs_world &world) {
     mix(constraint->getMaxAppliedImpulse()), mix(constraint->compliance()), mix3(constraint->pivot());
     if (constraint->damping_time() != 0) mix(constraint->damping_time());
     if (constraint->hardening() != 0) mix(constraint->hardening());
+    if (constraint->is_bent()) {
+      mix(constraint->width());
+      for (int i = 0; i < BS_CLAMP_POINTS; ++i) mix(constraint->bent_compliance(i));
+    }
     if (constraint->shift_compliance() != 0) mix(constraint->shift_compliance()), mix(constraint->shift_damping_time());
   }
   return static_cast<double>(hash >> 12);

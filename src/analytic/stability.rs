@@ -50,7 +50,8 @@ impl Chain {
     fn new(robot: &Robot) -> Self {
         let lengths: Vec<f64> = robot.segments().iter().map(|segment| segment.length).collect();
         let bodies = robot.rigid_bodies();
-        let compliance = robot.extensions.clamp_compliance;
+        // Of a curve, the largest: the softest clamp holds least.
+        let compliance = robot.extensions.clamp_compliance + robot.extensions.clamp_curve.largest();
         let inertia = |(body, length): (&crate::model::RigidBody, &f64)| {
             let arm = body.middle * length;
             Inertia { mass: body.mass, moment: body.mass * arm, about_end: body.inertia + body.mass * arm * arm }
@@ -147,12 +148,18 @@ fn largest(high: f64, holds: impl Fn(f64) -> bool) -> f64 {
 /// det(K − ω² M) = 0,   K = k·1,   M: mass matrix of the joints with the base fixed or eliminated
 /// ```
 ///
-/// A compliant clamp counts as a hinge. O(n) for n joints; relative error below 1e-10 against the dense eigenvalue problem.
+/// A compliant clamp counts as a hinge; where joints differ in stiffness, all count as the stiffest, for an upper bound. O(n) for n joints; relative error below 1e-10 against the dense eigenvalue problem.
 pub fn highest_joint_frequency(robot: &Robot) -> f64 {
     let chain = Chain::new(robot);
     // K is a multiple of the unit matrix: the largest ω² is k over the smallest eigenvalue of M.
     let smallest = largest(chain.last(), |eigenvalue| chain.is_positive(1.0, 0.0, -eigenvalue, 0.0, 0.0));
-    (robot.joint().stiffness / smallest).sqrt()
+    (robot.joint().stiffness * stiffest(robot) / smallest).sqrt()
+}
+
+/// The largest factor on a joint's stiffness (–).
+fn stiffest(robot: &Robot) -> f64 {
+    let factors = &robot.extensions.joint_stiffness;
+    if factors.is_empty() { 1.0 } else { factors.iter().copied().fold(0.0, f64::max) }
 }
 
 /// Largest time step (s) at which the torque law, evaluated at the start of each step, is stable.
@@ -166,7 +173,7 @@ pub fn highest_joint_frequency(robot: &Robot) -> f64 {
 /// At the limit a mode alternates from step to step with constant amplitude. For one mode of frequency ω with c = ηω² the limit is
 /// `h < (√(c² + 4ω²) − c)/ω²`, which tends to 2/(ηω²) for strong damping. Contact can require a smaller step.
 ///
-/// The robot's extensions are included: factors on stiffness, damping and mass; point masses; a clamp that turns or shifts (implicit, so it adds `h²/c` at the
+/// The robot's extensions are included: factors on stiffness, damping and mass (the stiffest joint counts, a lower bound of the limit); point masses; a clamp that turns or shifts (implicit, so it adds `h²/c` at the
 /// base); dry friction of the joints with its slope at rest; curves of their moment with their steepest slope; springs with a limit; tapes and cables, taut and at rest; viscous friction on the floor (an upper bound); material loss, by the spectral radius
 /// of a step at frequencies up to the highest. Hardening is left to [`stable_step_at`]. Air drag is neglected: its rate is below 1 % of 1/h at all
 /// speeds that Bullet allows.
@@ -178,7 +185,8 @@ pub fn stable_step(robot: &Robot) -> f64 {
 
 /// As [`stable_step`] (s), for joints bent elastically by `curvature` (1/cm), where hardening may make them stiffer.
 pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
-    let (chain, joint, extensions) = (Chain::new(robot), robot.joint(), &robot.extensions);
+    let (chain, mut joint, extensions) = (Chain::new(robot), robot.joint(), &robot.extensions);
+    joint.stiffness *= stiffest(robot);
     // The slope of k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p).
     let hardening = 1.0 + (extensions.softening_exponent + 1.0) * (-extensions.softened(curvature)).max(0.0);
     let link = robot.link_length();

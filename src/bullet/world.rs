@@ -23,6 +23,14 @@ pub struct World {
     pub(super) contacts: Vec<sys::bs_contact>,
 }
 
+/// How a base that gives is tied to the world.
+enum Tie {
+    /// By a spring with its compliance (rad/(dyn·cm)) and hardening (1/rad).
+    Sprung { compliance: f64, hardening: f64 },
+    /// With a compliance (rad/(dyn·cm)) at the multiples of a moment (dyn·cm).
+    Bent { width: f64, compliances: [f64; sys::BS_CLAMP_POINTS as usize] },
+}
+
 impl World {
     /// An empty world.
     ///
@@ -166,26 +174,65 @@ impl World {
         hardening: f64,
         max_impulse: f64,
     ) -> Result<(), BulletError> {
+        positive("a compliance (rad/(dyn·cm))", &[compliance])?;
+        not_negative("a hardening (1/rad)", hardening)?;
+        self.add_tie(body, pivot, &Tie::Sprung { compliance, hardening }, damping_time, max_impulse)
+    }
+
+    /// The same with a compliance that depends on the moment: `compliances` (rad/(dyn·cm)) at the multiples of `width` (dyn·cm) from 0, linear between
+    /// them and constant beyond. The turn is the integral of the compliance over the moment.
+    ///
+    /// # Errors
+    /// As [`add_sprung_constraint`](Self::add_sprung_constraint); also for a width that is not positive.
+    pub fn add_bent_constraint(
+        &mut self,
+        body: BodyId,
+        pivot: [f64; 3],
+        width: f64,
+        compliances: [f64; sys::BS_CLAMP_POINTS as usize],
+        damping_time: f64,
+        max_impulse: f64,
+    ) -> Result<(), BulletError> {
+        positive("a width (dyn·cm)", &[width])?;
+        positive("a compliance (rad/(dyn·cm))", &compliances)?;
+        self.add_tie(body, pivot, &Tie::Bent { width, compliances }, damping_time, max_impulse)
+    }
+
+    /// Ties the base of `body` with a law that was checked.
+    fn add_tie(
+        &mut self,
+        body: BodyId,
+        pivot: [f64; 3],
+        tie: &Tie,
+        damping_time: f64,
+        max_impulse: f64,
+    ) -> Result<(), BulletError> {
         self.links_of(body)?;
         finite("a pivot (cm)", &pivot)?;
-        positive("a compliance (rad/(dyn·cm))", &[compliance])?;
         not_negative("a damping time (s)", damping_time)?;
-        not_negative("a hardening (1/rad)", hardening)?;
         positive("the largest impulse (dyn·s)", &[max_impulse])?;
+        let (world, index, at) = (self.pointer(), body.index, pivot.as_ptr());
         let mut message = Message::new();
-        // SAFETY: the body's index is valid in this world (links_of); pivot has the 3 values asked for; the message's length is its own.
+        let text = message.0.as_mut_ptr();
+        // SAFETY: the body's index is valid in this world (links_of); pivot and compliances have the 3 and BS_CLAMP_POINTS values asked for; the message's
+        // length is its own.
         let code = unsafe {
-            sys::bs_sprung_constraint_add(
-                self.pointer(),
-                body.index,
-                pivot.as_ptr(),
-                compliance,
-                damping_time,
-                hardening,
-                max_impulse,
-                message.0.as_mut_ptr(),
-                256,
-            )
+            match tie {
+                Tie::Sprung { compliance, hardening } => {
+                    sys::bs_sprung_constraint_add(world, index, at, *compliance, damping_time, *hardening, max_impulse, text, 256)
+                }
+                Tie::Bent { width, compliances } => sys::bs_bent_constraint_add(
+                    world,
+                    index,
+                    at,
+                    *width,
+                    compliances.as_ptr(),
+                    damping_time,
+                    max_impulse,
+                    text,
+                    256,
+                ),
+            }
         };
         self.checked(code, &message)
     }

@@ -21,7 +21,8 @@ pub fn run(options: Options) -> Result<ExitCode, Failure> {
                         json!({"name": p.name, "unit": p.unit, "bounds": p.bounds, "off": p.off.map(number), "default": p.default.map(number), "about": p.about})
                     })
                     .collect();
-                json!({"id": effect.id, "kind": effect.kind, "cause": effect.cause, "equation": effect.equation, "source": effect.source, "parameters": parameters})
+                let lists: Vec<_> = effect.groups().into_iter().map(|(key, names)| json!({"key": key, "parameters": names})).collect();
+                json!({"id": effect.id, "kind": effect.kind, "cause": effect.cause, "equation": effect.equation, "source": effect.source, "parameters": parameters, "lists": lists})
             })
             .collect();
         print(&format!("{}\n", json!({"schema": 1, "effects": effects})))?;
@@ -30,6 +31,10 @@ pub fn run(options: Options) -> Result<ExitCode, Failure> {
     let mut text = String::new();
     for effect in EFFECTS {
         text += &format!("{} ({})\n    {}\n    {}\n", effect.id, effect.kind.name(), effect.cause, effect.equation);
+        for (key, names) in effect.groups() {
+            let (first, last) = (names[0], names[names.len() - 1]);
+            text += &format!("        {key} = [{} numbers]: {first} to {last}\n", names.len());
+        }
         for p in effect.parameters {
             let unit = if p.unit.is_empty() { String::new() } else { format!(" ({})", p.unit) };
             let off = p.off.map_or_else(String::new, |off| format!(", off {off}"));

@@ -90,7 +90,15 @@ mod tests {
     use crate::effects::Place;
 
     const BENCH: Bench = Bench { is_clamped: true, is_on_floor: true, actuators: 5, markers: 3, runs: 5 };
-    const VISITED: Visited = Visited { volts: [-1500.0, 400.0], curvature: 5.0, rate: 300.0 };
+    const VISITED: Visited = Visited {
+        volts: [-1500.0, 400.0],
+        curvature: 5.0,
+        rate: 300.0,
+        root_moment: 3.0,
+        slip_speed: 100.0,
+        coordinate: 50.0,
+        axes: [true; 2],
+    };
 
     #[test]
     fn every_effect_is_a_candidate_or_excluded_for_a_reason() {
@@ -136,5 +144,16 @@ mod tests {
             all.into_iter().find(|c| c.id == "free-voltage-curve").map(|c| c.parameters.len())
         };
         assert_eq!((of(&VISITED), of(&one_sided)), (Some(10), Some(5)));
+    }
+
+    #[test]
+    fn an_axis_that_is_not_measured_is_not_fitted() {
+        for (axes, count) in [([true; 2], 12), ([false, true], 6), ([true, false], 6)] {
+            let all = candidates(&BENCH, &Visited { axes, ..VISITED });
+            let picture = all.into_iter().find(|c| c.id == "free-picture").unwrap();
+            let of_x = picture.parameters.iter().filter(|p| p.name.starts_with("x_")).count();
+            assert_eq!((picture.parameters.len(), of_x), (count, if axes[0] { 6 } else { 0 }));
+            assert_eq!(picture.starts.len(), count);
+        }
     }
 }

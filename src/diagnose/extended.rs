@@ -9,7 +9,7 @@ use super::pipeline::Outcome;
 use super::plant::{Model, Plant};
 use super::robot::RobotPlant;
 use super::track::{NUMERICAL_DAMPING, ON_STEP};
-use crate::effects::View;
+use crate::effects::{self, View};
 use crate::experiment::{DriveConfig, EffectConfig, SimulationConfig, StepConfig};
 use crate::model::Mount;
 
@@ -55,22 +55,23 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
     // The table's positive voltages include the gain.
     config.robot.positive_gain = None;
     config.drive = DriveConfig { waveform: Some("csv".into()), file: Some("drive.csv".into()), ..DriveConfig::default() };
-    let mut effects = Vec::new();
+    let mut applied_effects = Vec::new();
     if model.resolution as usize != plant.robot().motors_per_actuator {
-        let parameters = [("motors_per_actuator".to_owned(), model.resolution)].into();
-        config.effect.push(EffectConfig { id: "discretisation".into(), parameters });
+        let discretisation =
+            effects::find("discretisation").map(|effect| EffectConfig::new(effect, [("motors_per_actuator", model.resolution)]));
+        config.effect.extend(discretisation);
     }
     for term in &model.terms {
         let Ok(applied) = plant.applied_in(term, run) else { continue };
         let pairs = applied.effect.parameters.iter().zip(&applied.values);
-        let parameters = pairs.filter(|(_, v)| v.is_finite()).map(|(p, v)| (p.name.to_owned(), *v)).collect();
-        config.effect.push(EffectConfig { id: applied.effect.id.into(), parameters });
-        effects.push(applied);
+        let parameters = pairs.filter(|(_, v)| v.is_finite()).map(|(p, v)| (p.name, *v));
+        config.effect.push(EffectConfig::new(applied.effect, parameters));
+        applied_effects.push(applied);
     }
     let step = plant.step(run) * if model.fine { 0.5 } else { 1.0 };
     let steps = plant.steps_of(run, step);
     // A camera's delay needs positions between rows, so every step is recorded.
-    let late = View::new(&effects).delay > 0.0;
+    let late = View::new(&applied_effects).delay > 0.0;
     let every = if late { 1 } else { interval(&plant.signals()[run].times, step).unwrap_or(1) };
     let values = 10.0 * model.resolution * n as f64 + 13.0;
     let every = every.max((steps as f64 * values / MOST_RECORDED).ceil() as u64).clamp(1, steps);

@@ -138,7 +138,7 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("ground-friction", _) => "factor on the friction".into(),
         ("sensor-scale", _) => "scale of the camera".into(),
         _ => {
-            let units = ["_per_m", "_mm_s", "_v_per_s", "_mm2", "_mm", "_deg", "_mn_m", "_g", "_s", "_v"];
+            let units = ["_rad_per_n_m", "_per_m", "_mm_s", "_v_per_s", "_mm2", "_mm", "_deg", "_mn_m", "_g", "_s", "_v"];
             units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name).replace('_', " ")
         }
     }

@@ -10,7 +10,7 @@ use super::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal, T
 use super::quality;
 use super::response::Sine;
 use super::track::{ON_STEP, track};
-use super::visited::{Visit, visited};
+use super::visited::{Visit, Visited, visited};
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
@@ -171,7 +171,10 @@ impl RobotPlant {
         let visits: Vec<_> = (0..self.runs.len()).map(visit).collect();
         let bench = effects::Bench::new(&self.robot, self.markers.len(), self.runs.len());
         // A nominal model that cannot be simulated is reported by the first prediction.
-        let mut all = visited(&visits).map_or(Vec::new(), |visited| candidates(&bench, &visited));
+        let mut all = visited(&visits).map_or(Vec::new(), |visited| {
+            let (coordinate, axes) = self.seen();
+            candidates(&bench, &Visited { coordinate, axes, ..visited })
+        });
         if self.without_voltage {
             // What acts on voltages does nothing without any.
             all.retain(|c| {
@@ -180,6 +183,23 @@ impl RobotPlant {
         }
         self.candidates = all;
         self
+    }
+
+    /// The largest coordinate of a marker (mm), measured or on the flat robot, and whether x and z are measured. A frequency response has no positions, only an axis.
+    fn seen(&self) -> (f64, [bool; 2]) {
+        let (mut coordinate, mut axes) = (0.0_f64, [false; 2]);
+        for (run, signal) in self.runs.iter().zip(&self.signals) {
+            if let Some(response) = &run.response {
+                axes[response.channel % 2] = true;
+                continue;
+            }
+            for (value, channel) in signal.values.iter().zip(&signal.channels) {
+                axes[channel % 2] = true;
+                coordinate = coordinate.max(value.abs());
+            }
+        }
+        // Where a place is not measured, or badly, it is that of the flat robot.
+        (self.markers.iter().fold(coordinate, |most, position| most.max(10.0 * position)), axes)
     }
 
     /// Sets each run's time step to the longest that keeps its prediction within [`LARGEST_CHANGE`].

@@ -12,6 +12,7 @@ mod curve;
 mod driver;
 mod fitting;
 mod ground;
+mod groups;
 mod measurement;
 mod numerics;
 mod signal_chain;
@@ -19,6 +20,7 @@ mod structure;
 mod view;
 
 pub use fitting::{Bench, Fitting, Form, Place, Shape, fits};
+pub use groups::Given;
 pub use signal_chain::{SignalChain, SignalStage};
 pub use view::View;
 
@@ -149,6 +151,7 @@ pub static EFFECTS: &[&Effect] = &[
     &numerics::DISCRETISATION,
     &structure::STIFFNESS_DRIFT,
     &structure::CLAMP_COMPLIANCE,
+    &structure::FREE_CLAMP,
     &structure::CLAMP_SHIFT,
     &structure::TIP_MASS,
     &structure::INITIAL_CURVATURE,
@@ -161,6 +164,7 @@ pub static EFFECTS: &[&Effect] = &[
     &structure::FREE_MOMENT_OF_RATE,
     &structure::FREE_JOINT_MEMORY,
     &structure::FREE_JOINT_SLIP,
+    &structure::FREE_STIFFNESS_ALONG,
     &structure::FREE_MASS,
     &structure::FREE_DRAG,
     &driver::TIME_DELAY,
@@ -183,12 +187,14 @@ pub static EFFECTS: &[&Effect] = &[
     &actuation::PASSIVE_MARGIN,
     &ground::GROUND_FRICTION,
     &ground::STICK_SLIP,
+    &ground::FREE_FLOOR_FRICTION,
     &ground::CONTACT_RESTITUTION,
     &ground::GROUND_SLOPE,
     &measurement::SENSOR_SCALE,
     &measurement::SENSOR_OFFSET,
     &measurement::SENSOR_DELAY,
     &measurement::CAMERA_TILT,
+    &measurement::FREE_PICTURE,
 ];
 
 /// The effect with an id; none if there is none.
@@ -220,6 +226,50 @@ pub enum EffectError {
         id: &'static str,
         /// The parameter.
         name: &'static str,
+    },
+    /// A list of another length than the group of parameters that it stands for.
+    #[error("effect {id}: {name} has {given} numbers, but stands for {needed}: {first} to {last}")]
+    Length {
+        /// The effect.
+        id: &'static str,
+        /// The key of the list.
+        name: String,
+        /// Length of the list.
+        given: usize,
+        /// Number of parameters.
+        needed: usize,
+        /// The first of them.
+        first: &'static str,
+        /// The last of them.
+        last: &'static str,
+    },
+    /// A list for a key that takes one number.
+    #[error("effect {id}: {name} takes one number, not a list")]
+    OneNumber {
+        /// The effect.
+        id: &'static str,
+        /// The key.
+        name: String,
+    },
+    /// One number for a key that takes a list.
+    #[error("effect {id}: {name} takes a list of {needed} numbers")]
+    List {
+        /// The effect.
+        id: &'static str,
+        /// The key.
+        name: String,
+        /// Number of parameters.
+        needed: usize,
+    },
+    /// A parameter that is given by its own key and in a list.
+    #[error("effect {id}: {name} is given by its own key and in {list}; keep one of the two")]
+    Twice {
+        /// The effect.
+        id: &'static str,
+        /// The parameter.
+        name: &'static str,
+        /// The key of the list.
+        list: String,
     },
     /// A value out of range.
     #[error("effect {id}: {name} is {}, but must lie between {} and {}", number(*.value), number(*.low), number(*.high))]
@@ -360,6 +410,10 @@ pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Resul
             Action::Drive(change) => change(&applied.values, drive),
             _ => {}
         }
+    }
+    if !robot.extensions.clamp_curve.is_rigid() && robot.extensions.clamp_hardening != 0.0 {
+        let message = "cannot stand beside a clamp-compliance with hardening_per_rad: put both into the curve".into();
+        return Err(EffectError::Robot { id: "free-clamp", message });
     }
     Ok(())
 }

@@ -8,7 +8,8 @@
 //!   the state at the step's start, an error of first order in the step. Only the Prony chains have a memory; it is part of saved states.
 //! - A point mass changes mass, centre of mass and inertia of the body it is fixed to, exactly. Records stay those of the boxes.
 //! - A compliant clamp is a spring at the left end, in the constraint that holds the base. It is implicit, so any compliance is stable at any step; its
-//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step. So is a clamp that shifts.
+//!   numerical damping, a ratio of ω h/2 on the clamp's share of a mode's energy, is of first order in the step. So is a clamp that shifts. A clamp whose turn
+//!   is a curve of the moment is linearised there at the step's start, a further error of first order.
 //! - Restitution is Bullet's, with its threshold of 0.2 cm/s, without the push-out of the overlap that Bullet adds. The approach speed includes what the
 //!   step's forces add, so a foot that the actuators press down by more than 0.2 cm/s per step trembles; the planar engine takes the speed at the step's start.
 
@@ -93,9 +94,13 @@ impl BulletEngine {
         // The base's box stands at the origin.
         let com_to_box: Vec<f64> = boxes.iter().map(|link| link.com_to_box[0]).collect();
         let body = world.add_multibody(&boxes[0], &boxes[1..], [0.0 - com_to_box[0], 0.0, 0.0])?;
-        match robot.mount {
-            Mount::Clamped if extensions.clamp_compliance > 0.0 => {
-                let left_end = [-bodies[0].middle * segments[0].length, 0.0, 0.0];
+        let left_end = [-bodies[0].middle * segments[0].length, 0.0, 0.0];
+        match (robot.mount, extensions.curved_clamp()) {
+            (Mount::Clamped, Some(curve)) => {
+                let (width, damping) = (curve.width(), extensions.clamp_damping);
+                world.add_bent_constraint(body, left_end, width, curve.compliances(), damping, CLAMP_IMPULSE)?;
+            }
+            (Mount::Clamped, None) if extensions.clamp_compliance > 0.0 => {
                 world.add_sprung_constraint(
                     body,
                     left_end,
@@ -105,8 +110,8 @@ impl BulletEngine {
                     CLAMP_IMPULSE,
                 )?;
             }
-            Mount::Clamped => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
-            Mount::Ground => {
+            (Mount::Clamped, None) => world.add_fixed_constraint(body, CLAMP_IMPULSE)?,
+            (Mount::Ground, _) => {
                 world.add_ground(&Ground {
                     half_extents: GROUND_HALF_EXTENTS,
                     top: -0.5 * robot.collision_thickness,
@@ -116,7 +121,7 @@ impl BulletEngine {
                     collision_margin: COLLISION_MARGIN,
                 })?;
             }
-            Mount::Free => {}
+            (Mount::Free, _) => {}
         }
         if robot.mount == Mount::Clamped && extensions.clamp_shift > 0.0 {
             world.set_constraint_shift(body, extensions.clamp_shift, extensions.clamp_shift_damping)?;

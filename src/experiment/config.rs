@@ -9,6 +9,7 @@ use toml::Table;
 use toml::de::{DeTable, DeValue};
 
 use super::presets;
+use crate::effects::Effect;
 use crate::words;
 
 /// An experiment that cannot be run as it is written.
@@ -99,9 +100,38 @@ impl Config {
 pub struct EffectConfig {
     /// Name of the effect.
     pub id: String,
-    /// Values by parameter.
+    /// Values by parameter or group of numbered parameters.
     #[serde(flatten)]
-    pub parameters: BTreeMap<String, f64>,
+    pub parameters: BTreeMap<String, EffectValue>,
+}
+
+impl EffectConfig {
+    /// A table that gives `parameters` (name, value), those of a whole group as a list.
+    pub fn new<'a>(effect: &Effect, parameters: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+        let mut parameters: BTreeMap<String, f64> =
+            parameters.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        let mut values = BTreeMap::new();
+        for (key, names) in effect.groups() {
+            if names.iter().all(|name| parameters.contains_key(*name)) {
+                let list = names.iter().filter_map(|name| parameters.remove(*name)).collect();
+                values.insert(key, EffectValue::Numbers(list));
+            }
+        }
+        values.extend(parameters.into_iter().map(|(name, value)| (name, EffectValue::Number(value))));
+        Self { id: effect.id.to_owned(), parameters: values }
+    }
+}
+
+/// The value of a key of an effect.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(untagged)]
+pub enum EffectValue {
+    /// A parameter.
+    Number(f64),
+    /// Numbered parameters in their order.
+    Numbers(Vec<f64>),
+    /// Neither; refused where the experiment is checked, which knows key and line.
+    Other(toml::Value),
 }
 
 /// `[material]`: a preset and what overrides it.

@@ -13,8 +13,8 @@ mod step_choice;
 
 pub(crate) use config::line_of;
 pub use config::{
-    Config, ConfigError, DriveConfig, EffectConfig, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig, Setting,
-    SimulationConfig, Source, StepConfig,
+    Config, ConfigError, DriveConfig, EffectConfig, EffectValue, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig,
+    Setting, SimulationConfig, Source, StepConfig,
 };
 pub use range::Bending;
 pub(crate) use range::{step_too_long, unstable};

@@ -331,14 +331,14 @@ fn accumulator(experiment: &Experiment, start: u64, every: u64, last: u64) -> Me
     })
 }
 
-/// Turns the recorded places of the nodes into what is seen of them, scaled and rolled about the left end of the flat robot at x = `origin` (cm);
+/// Turns the recorded places of the nodes into what is seen of them, scaled, rolled and bent about the left end of the flat robot at x = `origin` (cm);
 /// velocities stay those of the robot.
 fn see(recording: &mut Recording, view: &View, origin: f64) {
     if view.is_plain() {
         return;
     }
-    // What neither scales nor rolls keeps its bits.
-    let origin = if view.scale == 1.0 && view.tilt == 0.0 { 0.0 } else { origin };
+    // What only shifts keeps its bits.
+    let origin = if view.only_shifts() { 0.0 } else { origin };
     let width = 3 * recording.nodes();
     let late = |row: usize, column: usize| {
         let (p, v) = (&recording.positions, &recording.node_velocities);

@@ -233,6 +233,6 @@ pub(super) const SIMULATION: Section = Section {
 pub(super) const EFFECT: Section = Section {
     name: "effect",
     heading: "[[effect]]",
-    about: "Zero or more extensions of the model, each with its parameters as further keys: `sfers effects` lists them with units, ranges and defaults. At most 100.",
+    about: "Zero or more extensions of the model, each with its parameters as further keys: `sfers effects` lists them with units, ranges and defaults; numbered ones, as moment_1_mn_m to moment_5_mn_m, may be given as a list under the key without the number, moment_mn_m = [0.1, 0.2, 0.2, 0.1, 0]. At most 100.",
     keys: &[key("id", Name("effect", effects), Needed, "name of the effect")],
 };

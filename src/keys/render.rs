@@ -193,9 +193,25 @@ fn row(key: &Key) -> String {
     format!("| `{}` | {} | {} | {default} | {allowed} | {}{with} |\n", key.name, key.value.kind(), unit(key.name), key.about)
 }
 
+/// Which keys take lists.
+fn lists_of_effects() -> String {
+    let mut text = String::from(
+        "\nNumbered keys may be given together, as a list under the key without the number, in the order of the numbers:\n\n",
+    );
+    for effect in EFFECTS {
+        let of = |(key, names): &(String, Vec<&str>)| format!("`{key}` ({} numbers)", names.len());
+        let lists: Vec<String> = effect.groups().iter().map(of).collect();
+        if !lists.is_empty() {
+            text += &format!("- `{}`: {}\n", effect.id, lists.join(", "));
+        }
+    }
+    text
+}
+
 /// Table of the effects' parameters, keys of `[[effect]]`.
 fn effect_keys() -> String {
-    let mut text = String::from("\n| `id` | key | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |\n");
+    let mut text = lists_of_effects();
+    text += "\n| `id` | key | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |\n";
     for effect in EFFECTS {
         for p in effect.parameters {
             let default = p.default.map_or_else(|| "needed".to_owned(), number);

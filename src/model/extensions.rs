@@ -1,6 +1,8 @@
 //! What a robot has beyond the plain model. Everything is off by default, and off costs nothing and changes no bit.
 
+use super::clamp::ClampCurve;
 use super::curve::Curve;
+use super::friction::FrictionCurve;
 
 /// Additions to the plain robot that both engines know how to step. [`crate::effects`] sets them; the fields are in CGS units.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +23,8 @@ pub struct Extensions {
     pub clamp_damping: f64,
     /// a of the moment φ (1 + (a φ)²) over the compliance of a compliant clamp that turns by φ (1/rad).
     pub clamp_hardening: f64,
+    /// Turn of a clamped root as a curve of the moment, in series with the compliance. Not beside a hardening.
+    pub clamp_curve: ClampCurve,
     /// Shift in z of a clamped left end per force on it (cm/dyn).
     pub clamp_shift: f64,
     /// Damping of that shift over its stiffness (s).
@@ -31,6 +35,8 @@ pub struct Extensions {
     pub rest_curvature: Vec<f64>,
     /// Factor on each joint's voltage (–), or none.
     pub joint_gains: Vec<f64>,
+    /// Factor on each joint's stiffness (–), or none.
+    pub joint_stiffness: Vec<f64>,
     /// a of `k δ (1 − a κ₀² (|δ|/(ℓ κ₀))^p)` (cm²), with κ₀ = `SOFTENING_CURVATURE`.
     pub softening: f64,
     /// p of the same; 2 is the cubic law.
@@ -57,6 +63,8 @@ pub struct Extensions {
     pub restitution: f64,
     /// How friction depends on the sliding speed.
     pub stick_slip: StickSlip,
+    /// Change of the coefficient of friction with the sliding speed, beside `stick_slip`.
+    pub friction_of_speed: FrictionCurve,
 }
 
 /// A spring that slips at a moment: friction that begins with elastic presliding (Jenkins's element; Iwan 1966).
@@ -153,11 +161,13 @@ impl Default for Extensions {
             clamp_compliance: 0.0,
             clamp_damping: 0.0,
             clamp_hardening: 0.0,
+            clamp_curve: ClampCurve::RIGID,
             clamp_shift: 0.0,
             clamp_shift_damping: 0.0,
             point_masses: Vec::new(),
             rest_curvature: Vec::new(),
             joint_gains: Vec::new(),
+            joint_stiffness: Vec::new(),
             softening: 0.0,
             softening_exponent: 2.0,
             dry_friction: 0.0,
@@ -171,6 +181,7 @@ impl Default for Extensions {
             slope: 0.0,
             restitution: 0.0,
             stick_slip: StickSlip::OFF,
+            friction_of_speed: FrictionCurve::OFF,
         }
     }
 }
@@ -200,6 +211,11 @@ pub(crate) const LEAST_DRAG_RATIO: f64 = 1e-4;
 pub const AIR_DENSITY: f64 = 1.2e-3;
 
 impl Extensions {
+    /// The turn of a clamped root as a curve of the moment, everything in series; none if it is no curve but linear, hardening or rigid.
+    pub fn curved_clamp(&self) -> Option<ClampCurve> {
+        (!self.clamp_curve.is_rigid()).then(|| self.clamp_curve.in_series(self.clamp_compliance))
+    }
+
     /// Whether the joints' torque law has terms beyond eq. 1.
     pub fn bends_torque_law(&self) -> bool {
         self.softening != 0.0
@@ -208,6 +224,11 @@ impl Extensions {
             || !self.slips.is_empty()
             || !self.moment_of_curvature.is_zero()
             || !self.moment_of_rate.is_zero()
+    }
+
+    /// Whether friction depends on the sliding speed.
+    pub fn has_friction_of_speed(&self) -> bool {
+        self.stick_slip != StickSlip::OFF || !self.friction_of_speed.is_off()
     }
 
     /// Whether joints have a Maxwell chain.

@@ -12,18 +12,22 @@
 //! | static tip at −1000 V, m = 3 | −19.0 mm | −23.4 mm | −20 mm |
 
 mod builder;
+mod clamp;
 mod curve;
 mod extensions;
+mod friction;
 mod laminate;
 mod robot;
 pub mod units;
 
+pub use clamp::{CLAMP_POINTS, ClampCurve};
 pub use curve::{CURVE_POINTS, Curve};
 pub(crate) use extensions::LEAST_DRAG_RATIO;
 pub use extensions::{
     AIR_DENSITY, ATTACHMENT_RATE, Attachment, DRAG_POWERS, DRAG_SPEED, DRY_FRICTION_RATE, Extensions, LEAST_STIFFNESS,
     LOSS_TIMES, PointMass, SOFTENING_CURVATURE, Slip, StickSlip, VISCOUS_REACH,
 };
+pub use friction::{FRICTION_POINTS, FrictionCurve};
 pub use laminate::{Laminate, Material};
 pub use robot::{Damping, Film, Friction, MAX_JOINTS, Mount, RigidBody, Robot, Segment, box_inertia};
 

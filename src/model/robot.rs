@@ -301,6 +301,12 @@ impl Robot {
                 "as many joints as the bodies read",
             )?;
         }
+        ModelError::unless(
+            self.extensions.clamp_curve.is_rigid() || self.extensions.clamp_hardening == 0.0,
+            "effect.hardening_per_rad",
+            self.extensions.clamp_hardening,
+            "0 beside a clamp whose turn is a curve",
+        )?;
         let fraction = self.friction.film_fraction;
         ModelError::unless(fraction.is_finite() && fraction >= 0.0, "robot.friction.film_fraction", fraction, "zero or more")?;
         let films = match self.friction.film {

@@ -18,7 +18,7 @@ use super::fit::{Convergence, Estimator, Fit};
 use super::names;
 use super::plant::{Candidate, Model, Nuisance, Plant, Signal, Term};
 use super::visited::Visited;
-use crate::effects::Bench;
+use crate::effects::{self, Bench, EffectError};
 use crate::experiment::{self, Control, EffectConfig, Source};
 use crate::number::fixed;
 use config::config;
@@ -55,10 +55,10 @@ impl Plant for Numbers<'_> {
         let mut config = config(&self.dataset.nominal, observation)?;
         for term in &model.terms {
             let candidate = &self.candidates[term.candidate];
-            let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name.to_owned(), p.value(*x)));
-            let given = candidate.fixed.iter().map(|(name, value)| ((*name).to_owned(), *value));
-            let parameters = free.chain(given).filter(|(_, value)| value.is_finite()).collect();
-            config.effect.push(EffectConfig { id: candidate.id.into(), parameters });
+            let effect = effects::find(candidate.id).ok_or_else(|| EffectError::Unknown(candidate.id.into()))?;
+            let free = candidate.parameters.iter().zip(&term.x).map(|(p, x)| (p.name, p.value(*x)));
+            let parameters = free.chain(candidate.fixed.iter().copied()).filter(|(_, value)| value.is_finite());
+            config.effect.push(EffectConfig::new(effect, parameters));
         }
         let measure = || observation.measure.clone();
         let text = toml::to_string(&config)

@@ -67,7 +67,7 @@ pub const CLAMP_COMPLIANCE: Effect = Effect {
     shape: None,
     action: Action::Robot(|p, robot| {
         robot.extensions.clamp_compliance += 1e-7 * p[0];
-        robot.extensions.clamp_damping = p[1];
+        robot.extensions.clamp_damping += p[1];
         robot.extensions.clamp_hardening = p[2];
     }),
 };

@@ -10,6 +10,8 @@ pub(super) struct JointExtensions {
     /// Rest angle at 0 V of each joint (rad), and factor on its voltage.
     rest_angles: Vec<f64>,
     gains: Vec<f64>,
+    /// Factor on the stiffness of each joint.
+    stiffness: Vec<f64>,
     /// Memory of each joint, joints × states: q_j of its Prony chain, then the elastic angles of its springs with a limit (rad).
     pub(super) memory: Vec<f64>,
     /// Number of a joint's states.
@@ -22,7 +24,7 @@ impl JointExtensions {
     /// `None` for the plain model.
     pub(super) fn new(robot: &Robot) -> Option<Self> {
         let e = &robot.extensions;
-        if !e.bends_torque_law() && e.rest_curvature.is_empty() && e.joint_gains.is_empty() {
+        if !e.bends_torque_law() && e.rest_curvature.is_empty() && e.joint_gains.is_empty() && e.joint_stiffness.is_empty() {
             return None;
         }
         let (joints, m) = (robot.joints(), robot.motors_per_actuator);
@@ -32,6 +34,7 @@ impl JointExtensions {
             link: robot.link_length(),
             rest_angles: (0..joints).map(of_joint).collect(),
             gains: (0..joints).map(|i| e.joint_gains.get(i).copied().unwrap_or(1.0)).collect(),
+            stiffness: (0..joints).map(|i| e.joint_stiffness.get(i).copied().unwrap_or(1.0)).collect(),
             memory: vec![0.0; joints * (chain + e.slips.len())],
             states: chain + e.slips.len(),
             largest: 0.0,
@@ -42,6 +45,7 @@ impl JointExtensions {
     /// Torque of joint `i` (dyn·cm). `voltage` (V) is multiplied by the joint's gain.
     pub(super) fn torque(&mut self, i: usize, joint: &PiezoJoint, angle: f64, rate: f64, voltage: &mut f64) -> f64 {
         *voltage *= self.gains[i];
+        let joint = &PiezoJoint { stiffness: joint.stiffness * self.stiffness[i], ..*joint };
         let angle = angle - self.rest_angles[i];
         let delta = angle - joint.rest_angle_per_volt * *voltage;
         if self.extensions.softening < 0.0 {

@@ -3,11 +3,12 @@
 use super::add;
 use crate::bullet::{LinkState, Wrench};
 use crate::engine::LARGEST_FRICTION;
-use crate::model::{Mount, Robot, StickSlip, VISCOUS_REACH};
+use crate::model::{FrictionCurve, Mount, Robot, StickSlip, VISCOUS_REACH};
 
 /// One coefficient per body, as Bullet has one per collider: at the sliding speed of its lowest edge, where viscous friction acts too.
 pub(super) struct Sliding {
     law: StickSlip,
+    curve: FrictionCurve,
     plain: Vec<f64>,
     half_lengths: Vec<f64>,
     half_thickness: f64,
@@ -18,7 +19,7 @@ impl Sliding {
     /// `None` if friction does not depend on speed.
     pub(super) fn new(robot: &Robot) -> Option<Self> {
         let law = robot.extensions.stick_slip;
-        if law == StickSlip::OFF || robot.mount != Mount::Ground {
+        if !robot.extensions.has_friction_of_speed() || robot.mount != Mount::Ground {
             return None;
         }
         let segments = robot.segments();
@@ -26,6 +27,7 @@ impl Sliding {
             segments.iter().map(|segment| (segment.friction * robot.friction.ground).min(LARGEST_FRICTION)).collect();
         Some(Self {
             law,
+            curve: robot.extensions.friction_of_speed,
             half_lengths: segments.iter().map(|segment| 0.5 * segment.length).collect(),
             half_thickness: 0.5 * robot.collision_thickness,
             frictions: plain.clone(),
@@ -49,7 +51,7 @@ impl Sliding {
     pub(super) fn frictions(&mut self, boxes: &[LinkState]) -> &[f64] {
         for (i, body) in boxes.iter().enumerate() {
             let (_, speed) = self.edge(i, body);
-            self.frictions[i] = self.law.friction(self.plain[i], speed).min(LARGEST_FRICTION);
+            self.frictions[i] = self.curve.friction(self.law.friction(self.plain[i], speed), speed).min(LARGEST_FRICTION);
         }
         &self.frictions
     }

@@ -10,7 +10,7 @@ use super::law::ContactLaw;
 use super::quad::{Arms, Quad, Spatials};
 use super::recursion::ContactTerms;
 use crate::engine::LARGEST_FRICTION;
-use crate::model::{Extensions, StickSlip, VISCOUS_REACH};
+use crate::model::{Extensions, FrictionCurve, StickSlip, VISCOUS_REACH};
 
 /// The corners of all bodies, and the contact candidates of the current step.
 #[derive(Debug, Default)]
@@ -49,20 +49,23 @@ struct Reference {
 pub(super) struct Surface {
     restitution: f64,
     stick_slip: StickSlip,
+    of_speed: FrictionCurve,
 }
 
 impl Surface {
     /// `None` for a plain floor.
     pub(super) fn new(extensions: &Extensions) -> Option<Self> {
-        let Extensions { restitution, stick_slip, .. } = *extensions;
-        (restitution != 0.0 || stick_slip != StickSlip::OFF).then_some(Self { restitution, stick_slip })
+        let Extensions { restitution, stick_slip, friction_of_speed: of_speed, .. } = *extensions;
+        let is_plain = restitution == 0.0 && !extensions.has_friction_of_speed();
+        (!is_plain).then_some(Self { restitution, stick_slip, of_speed })
     }
 
     /// Friction at the sliding speeds of the step's start (cm/s).
     fn cone(&self, plain: FrictionCone, speed: f64x2) -> FrictionCone {
         let [a, b] = plain.friction();
         let [u, v] = speed.to_array();
-        let friction = [self.stick_slip.friction(a, u), self.stick_slip.friction(b, v)];
+        let at = |plain: f64, speed: f64| self.of_speed.friction(self.stick_slip.friction(plain, speed), speed);
+        let friction = [at(a, u), at(b, v)];
         FrictionCone::new(f64x2::new(friction.map(|friction| friction.min(LARGEST_FRICTION))))
     }
 }

@@ -63,6 +63,8 @@ mod state;
 mod statics;
 mod step;
 
+use std::cmp::Ordering;
+
 use fearless_simd::Level;
 use wide::f64x2;
 
@@ -74,7 +76,7 @@ use self::law::ContactLaw;
 pub use self::law::FrictionModel;
 use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::quad::Quad;
-use self::recursion::{BLOCK, BaseJoint, Distal, Slide};
+use self::recursion::{BLOCK, BaseJoint, Clamp, Distal, Slide, Turn};
 use self::step::{set_implicit, weight_of};
 use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, LARGEST_FRICTION, PlanarBase};
 use crate::actuator::PiezoJoint;
@@ -178,19 +180,8 @@ impl PlanarEngine {
         let levels = root.max(count - 1 - root) + 1;
         let blocks = if robot.mount == Mount::Ground && levels > LONGEST_WHOLE { levels.div_ceil(BLOCK) } else { 0 };
         let (mut quads, frictions) = bodies_in_quads(robot, &segments, &bodies, root, levels);
-        let mut base_joint = match robot.mount {
-            Mount::Clamped if extensions.clamp_shift > 0.0 => BaseJoint::Sliding(Slide {
-                hinge: (extensions.clamp_compliance > 0.0).then_some(extensions.clamp_damping),
-                stiffness: 1.0 / extensions.clamp_shift,
-                damping_time: extensions.clamp_shift_damping,
-                implicit: 0.0,
-                impulse: 0.0,
-            }),
-            Mount::Clamped if extensions.clamp_compliance > 0.0 => BaseJoint::Hinged { damping_time: extensions.clamp_damping },
-            Mount::Clamped => BaseJoint::Clamped,
-            _ => BaseJoint::Free,
-        };
-        if base_joint.hinge().is_some() {
+        let mut base_joint = base_joint(robot);
+        if let Some(Turn::Hinged { .. }) = base_joint.turn() {
             quads[0].stiffness.set_lane(0, 1.0 / extensions.clamp_compliance);
         }
         set_implicit(&mut quads, &joint, &mut base_joint, weight, time_step);
@@ -273,11 +264,11 @@ impl PlanarEngine {
 
     /// Velocity in z of a clamped root's reference point (cm/s): none unless the clamp gives.
     fn slide_velocity(&self) -> f64 {
-        let root = &self.quads[0];
-        match self.base_joint {
-            BaseJoint::Sliding(_) => root.motion[2].lane(0) - root.motion[0].lane(0) * root.half[0].lane(0),
-            _ => 0.0,
+        if !self.base_joint.slides() {
+            return 0.0;
         }
+        let root = &self.quads[0];
+        root.motion[2].lane(0) - root.motion[0].lane(0) * root.half[0].lane(0)
     }
 
     /// One number of body `i`.
@@ -285,6 +276,27 @@ impl PlanarEngine {
         let (quad, lane) = place(i, self.root);
         what(&self.quads[quad]).lane(lane)
     }
+}
+
+/// How the root of `robot` is joined to the world; what depends on the length of the step is set with it.
+fn base_joint(robot: &Robot) -> BaseJoint {
+    if robot.mount != Mount::Clamped {
+        return BaseJoint::Free;
+    }
+    let extensions = &robot.extensions;
+    let damping_time = extensions.clamp_damping;
+    let turn = match extensions.curved_clamp() {
+        Some(curve) => Turn::Curved { curve, damping_time, ahead: 0.0, share: 0.0 },
+        None if extensions.clamp_compliance > 0.0 => Turn::Hinged { damping_time },
+        None => Turn::Rigid,
+    };
+    let slide = (extensions.clamp_shift > 0.0).then(|| Slide {
+        stiffness: 1.0 / extensions.clamp_shift,
+        damping_time: extensions.clamp_shift_damping,
+        implicit: 0.0,
+        impulse: 0.0,
+    });
+    BaseJoint::Clamped(Clamp { turn, slide })
 }
 
 /// The bodies of `robot` in quads, and the coefficients of friction of each tree level's bodies.
@@ -306,7 +318,14 @@ fn bodies_in_quads(
         at.inertia.set_lane(lane, bodies[i].inertia);
         at.middle.set_lane(lane, if i < root { 1.0 - bodies[i].middle } else { bodies[i].middle });
         at.reach.set_lane(lane, if i < root { -segment.length } else { segment.length });
-        at.stiffness.set_lane(lane, joint.stiffness);
+        // Of the joint at the body's reference point; the root has none.
+        let own = match i.cmp(&root) {
+            Ordering::Less => Some(i),
+            Ordering::Equal => None,
+            Ordering::Greater => Some(i - 1),
+        };
+        let factor = own.and_then(|own| robot.extensions.joint_stiffness.get(own)).copied().unwrap_or(1.0);
+        at.stiffness.set_lane(lane, joint.stiffness * factor);
         frictions[2 * quad + lane / 2][lane % 2] = (segment.friction * robot.friction.ground).min(LARGEST_FRICTION);
     }
     for quad in &mut quads {

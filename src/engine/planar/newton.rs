@@ -60,7 +60,7 @@ fn solve_attached(
     skew: bool,
     quads: &mut [Quad],
     levels: Range<usize>,
-    base_joint: BaseJoint,
+    base_joint: &BaseJoint,
     contact: impl ContactTerms,
     distal: &mut [Distal],
 ) -> Articulated {
@@ -179,12 +179,12 @@ impl PlanarEngine {
         let floor = self.floor.tip_to_base(among, law);
         if let Some(attachments) = &self.attachments {
             let contact = attachments.with(floor);
-            return solve_attached(skew, &mut self.quads, levels.clone(), self.base_joint, contact, &mut self.distal);
+            return solve_attached(skew, &mut self.quads, levels.clone(), &self.base_joint, contact, &mut self.distal);
         }
         if skew {
-            solve::<true>(&mut self.quads, levels.clone(), self.base_joint, floor, &mut self.distal)
+            solve::<true>(&mut self.quads, levels.clone(), &self.base_joint, floor, &mut self.distal)
         } else {
-            solve::<false>(&mut self.quads, levels.clone(), self.base_joint, floor, &mut self.distal)
+            solve::<false>(&mut self.quads, levels.clone(), &self.base_joint, floor, &mut self.distal)
         }
     }
 

@@ -10,6 +10,7 @@ use wide::f64x2;
 
 use super::lanes::{fma, pair};
 use super::quad::{Arms, Quad, Spatial, Spatials};
+use crate::model::ClampCurve;
 
 /// What contact adds to the articulated inertia on the way from the tips to the base.
 pub(super) trait ContactTerms {
@@ -176,26 +177,48 @@ impl Articulated {
 }
 
 /// How the root is joined to the world.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) enum BaseJoint {
     /// Not at all.
     Free,
-    /// Rigidly.
-    Clamped,
-    /// By a hinge at its reference point, with the level's own torque and implicit terms.
+    /// By a clamp at its reference point.
+    Clamped(Clamp),
+}
+
+/// What a clamp lets the root do; both are independent of each other.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clamp {
+    /// The turn.
+    pub(super) turn: Turn,
+    /// The shift in z, if there is one.
+    pub(super) slide: Option<Slide>,
+}
+
+/// How a clamped root turns with the moment on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Turn {
+    /// Not at all.
+    Rigid,
+    /// As a hinge with the level's own torque and implicit terms.
     Hinged {
         /// Damping over stiffness (s).
         damping_time: f64,
     },
-    /// By a spring and a damper in z at its reference point, and rigidly or by a hinge.
-    Sliding(Slide),
+    /// As a curve says.
+    Curved {
+        curve: ClampCurve,
+        /// Damping over stiffness (s).
+        damping_time: f64,
+        /// Turn at which the moment acts over the mean rate, from the start of the step (s), with the damping.
+        ahead: f64,
+        /// Time over which the moment acts (s).
+        share: f64,
+    },
 }
 
 /// A spring and a damper between the world and the root's reference point, in z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Slide {
-    /// Damping over stiffness of a hinge (s), if there is one.
-    pub(super) hinge: Option<f64>,
     /// Stiffness (dyn/cm), and damping over it (s).
     pub(super) stiffness: f64,
     pub(super) damping_time: f64,
@@ -205,27 +228,53 @@ pub(super) struct Slide {
 }
 
 impl BaseJoint {
-    /// Damping over stiffness (s) of the root's hinge, if it has one.
-    pub(super) fn hinge(self) -> Option<f64> {
+    /// The turn, of a clamp.
+    pub(super) fn turn(&mut self) -> Option<&mut Turn> {
         match self {
-            Self::Hinged { damping_time } => Some(damping_time),
-            Self::Sliding(Slide { hinge, .. }) => hinge,
-            _ => None,
+            Self::Free => None,
+            Self::Clamped(clamp) => Some(&mut clamp.turn),
         }
+    }
+
+    /// The shift in z, of a clamp that gives there.
+    pub(super) fn slide(&mut self) -> Option<&mut Slide> {
+        match self {
+            Self::Free => None,
+            Self::Clamped(clamp) => clamp.slide.as_mut(),
+        }
+    }
+
+    /// Whether it shifts in z as a clamp gives.
+    pub(super) fn slides(&self) -> bool {
+        matches!(self, Self::Clamped(Clamp { slide: Some(_), .. }))
     }
 }
 
-impl Slide {
-    /// Turn and shift of the root under the whole chain.
+impl Clamp {
+    /// Mean motion of the root under the whole chain.
     fn motion(&self, whole: &Articulated, root: &Quad) -> Spatial {
         let [turning, _, coupling, .., sinking] = whole.inertia;
-        let (sinking, down) = (sinking + self.implicit, whole.force[2] + self.impulse);
-        if self.hinge.is_none() {
-            return [0.0, 0.0, down / sinking];
+        let [moment, _, down] = whole.force;
+        let Some(slide) = &self.slide else { return [self.turn.rate(turning, moment, root), 0.0, 0.0] };
+        let (sinking, down) = (sinking + slide.implicit, down + slide.impulse);
+        // The shift is eliminated first: what is left turns as under a clamp that does not shift.
+        let turn = self.turn.rate(turning - coupling * coupling / sinking, moment - coupling * down / sinking, root);
+        [turn, 0.0, (down - coupling * turn) / sinking]
+    }
+}
+
+impl Turn {
+    /// Mean rate of the root (rad/s), under an inertia that only turns and the moment's impulse.
+    fn rate(&self, inertia: f64, moment: f64, root: &Quad) -> f64 {
+        match self {
+            Self::Rigid => 0.0,
+            Self::Hinged { .. } => (moment + root.torque.lane(0)) / (inertia + root.implicit.lane(0)),
+            Self::Curved { curve, ahead, share, .. } => {
+                // I u = F − share·M with φ + ahead·u = φ(M), exactly: the root is the last to be eliminated.
+                let held = curve.moment(root.angle.lane(0) + ahead * moment / inertia, ahead * share / inertia);
+                (moment - share * held) / inertia
+            }
         }
-        let (turning, moment) = (turning + root.implicit.lane(0), whole.force[0] + root.torque.lane(0));
-        let determinant = turning * sinking - coupling * coupling;
-        [(moment * sinking - coupling * down) / determinant, 0.0, (turning * down - coupling * moment) / determinant]
     }
 }
 
@@ -245,10 +294,10 @@ fn root_motion<const SKEW: bool>(
     chain: Arms,
     through: &Joints,
     root: &Quad,
-    base_joint: BaseJoint,
+    base_joint: &BaseJoint,
     mut contact: impl ContactTerms,
 ) -> (Articulated, Spatial) {
-    if base_joint == BaseJoint::Clamped {
+    if matches!(base_joint, BaseJoint::Clamped(Clamp { turn: Turn::Rigid, slide: None })) {
         return Default::default();
     }
     let mut whole = chain.at_root::<SKEW>(through, root);
@@ -257,14 +306,11 @@ fn root_motion<const SKEW: bool>(
         (0..3).for_each(|k| whole.lower[k] += by.lower[k].to_array()[0]);
         (0..3).for_each(|k| whole.force[k] += by.force[k].to_array()[0]);
     }
-    if let BaseJoint::Hinged { .. } = base_joint {
-        let turn = (whole.force[0] + root.torque.lane(0)) / (whole.inertia[0] + root.implicit.lane(0));
-        return (whole, [turn, 0.0, 0.0]);
-    }
-    if let BaseJoint::Sliding(slide) = base_joint {
-        return (whole, slide.motion(&whole, root));
-    }
-    (whole, whole.motion::<SKEW>())
+    let motion = match base_joint {
+        BaseJoint::Free => whole.motion::<SKEW>(),
+        BaseJoint::Clamped(clamp) => clamp.motion(&whole, root),
+    };
+    (whole, motion)
 }
 
 /// Solves (Σ Jᵀ M J + implicit + contact) u = Σ Jᵀ p + torques for the mean motions u, with `contact` in its present modes.
@@ -275,7 +321,7 @@ fn root_motion<const SKEW: bool>(
 pub(super) fn solve<const SKEW: bool>(
     quads: &mut [Quad],
     levels: Range<usize>,
-    base_joint: BaseJoint,
+    base_joint: &BaseJoint,
     mut contact: impl ContactTerms,
     distal: &mut [Distal],
 ) -> Articulated {

@@ -12,7 +12,7 @@ use super::contact::FrictionCone;
 use super::lanes::{Four, Lanes, Two, inner};
 use super::law::ContactLaw;
 use super::quad::{Quad, direction};
-use super::recursion::BaseJoint;
+use super::recursion::Turn;
 use super::{Engine, EngineError, PlanarEngine};
 use crate::model::Mount;
 
@@ -53,7 +53,11 @@ impl PlanarEngine {
         self.velocity = [0.0; 2];
         self.finite = false;
         let base_joint = self.base_joint;
-        if let BaseJoint::Sliding(slide) = &mut self.base_joint {
+        if let Some(Turn::Curved { ahead, share, .. }) = self.base_joint.turn() {
+            // Displacements for velocities.
+            (*ahead, *share) = (1.0, 1.0);
+        }
+        if let Some(slide) = self.base_joint.slide() {
             slide.implicit = slide.stiffness;
         }
         let settled = dispatch!(self.level, simd => self.settle_in_steps(simd, &dynamic));
@@ -94,7 +98,7 @@ impl PlanarEngine {
                 }
                 before = last;
             }
-            if let BaseJoint::Sliding(slide) = &mut self.base_joint {
+            if let Some(slide) = self.base_joint.slide() {
                 slide.impulse = -slide.stiffness * self.centre[1];
             }
             let height = if self.clamped() { self.centre[1] } else { self.root_motion(simd)[0][1] };
@@ -123,7 +127,7 @@ impl PlanarEngine {
             let rise = Lanes::from(rise).sum();
             if self.mount != Mount::Clamped {
                 self.centre[1] += share * rise;
-            } else if let BaseJoint::Sliding(_) = self.base_joint {
+            } else if self.base_joint.slides() {
                 self.centre[1] += share * self.quads[0].mean[2].lane(0);
             }
             if largest <= SETTLED && rise.abs() <= SETTLED {

@@ -5,7 +5,7 @@ use fearless_simd::{Simd, prelude::*};
 use super::joint_extensions::LARGEST_REPETITIONS;
 use super::lanes::{Four, Lanes, Two, fma, inner, on};
 use super::quad::{Motions, Quad};
-use super::recursion::BaseJoint;
+use super::recursion::{BaseJoint, Turn};
 use super::{EngineError, LARGEST_COORDINATE, PlanarEngine};
 use crate::actuator::PiezoJoint;
 
@@ -51,7 +51,7 @@ impl PlanarEngine {
             }
             quad.load(momentum);
         }
-        if let BaseJoint::Sliding(slide) = &mut self.base_joint {
+        if let Some(slide) = self.base_joint.slide() {
             slide.impulse = -share * slide.stiffness * self.centre[1];
         }
         if self.floor.is_viscous() {
@@ -162,7 +162,7 @@ impl PlanarEngine {
             changed = fma(quad.inertia.on(simd) * turn, turn, fma(mass, fma(x, x, z * z), changed));
             momentum = [fma(share, after[1], momentum[0]), fma(share, after[2], momentum[1])];
         }
-        if let BaseJoint::Sliding(_) = self.base_joint {
+        if self.base_joint.slides() {
             self.centre[1] += h * self.quads[0].mean[2].lane(0);
         }
         let changed = Lanes::from(changed).sum();
@@ -215,15 +215,22 @@ pub(super) fn weight_of(damping: f64, time_step: f64) -> f64 {
 
 /// Sets what springs and dampers add to the joints' articulated inertia in a step of `time_step` (s).
 pub(super) fn set_implicit(quads: &mut [Quad], joint: &PiezoJoint, base_joint: &mut BaseJoint, weight: f64, time_step: f64) {
-    let implicit = Lanes::splat(weight * time_step * joint.stiffness * (joint.damping_time + 0.5 * time_step));
+    let [share, lag] = [weight * time_step, joint.damping_time + 0.5 * time_step].map(Lanes::splat);
     for quad in quads.iter_mut() {
+        let implicit = share * quad.stiffness * lag;
         quad.implicit = implicit.where_positive(quad.mass, Lanes::splat(1.0));
     }
-    if let Some(damping_time) = base_joint.hinge() {
-        let stiffness = quads[0].stiffness.lane(0);
-        quads[0].implicit.set_lane(0, weight * time_step * stiffness * (damping_time + 0.5 * time_step));
+    match base_joint.turn() {
+        Some(Turn::Hinged { damping_time }) => {
+            let stiffness = quads[0].stiffness.lane(0);
+            quads[0].implicit.set_lane(0, weight * time_step * stiffness * (*damping_time + 0.5 * time_step));
+        }
+        Some(Turn::Curved { damping_time, ahead, share, .. }) => {
+            (*ahead, *share) = (*damping_time + 0.5 * time_step, weight * time_step);
+        }
+        _ => {}
     }
-    if let BaseJoint::Sliding(slide) = base_joint {
+    if let Some(slide) = base_joint.slide() {
         slide.implicit = weight * time_step * slide.stiffness * (slide.damping_time + 0.5 * time_step);
     }
 }

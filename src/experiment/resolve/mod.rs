@@ -12,10 +12,10 @@ use std::path::Path;
 
 use self::driven::Driven;
 use self::steps::Steps;
-use super::config::{Config, ConfigError, EffectConfig, Fault, Source};
+use super::config::{Config, ConfigError, EffectConfig, EffectValue, Fault, Source};
 use super::{EngineKind, Experiment, Start};
 use crate::drive::{Drive, check_positive_gain};
-use crate::effects::{self, Applied, EffectError};
+use crate::effects::{self, Applied, EffectError, Given};
 use crate::engine::FrictionModel;
 use crate::model::units::{
     ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2, v_per_cm_from_kv_per_mm,
@@ -133,15 +133,48 @@ fn effects(config: &Config) -> Result<Vec<Applied>, Fault> {
     if config.effect.len() > MAX_EFFECTS {
         return Err(Fault::new("effect", format!("has {} tables; at most {MAX_EFFECTS} are possible", config.effect.len())));
     }
-    let read = |table: &EffectConfig| {
-        let effect = effects::find(&table.id).ok_or_else(|| EffectError::Unknown(table.id.clone()))?;
-        effect.with(table.parameters.iter().map(|(name, value)| (name.as_str(), *value)))
-    };
-    let place =
-        |(index, table)| read(table).map_err(|error: EffectError| Fault::new("effect", format!("table {}: {error}", index + 1)));
-    let mut effects: Vec<_> = config.effect.iter().enumerate().map(place).collect::<Result<_, _>>()?;
+    let mut effects = Vec::with_capacity(config.effect.len());
+    for (index, table) in config.effect.iter().enumerate() {
+        effects.push(effect(index, table)?);
+    }
     effects.retain(|applied| !applied.is_off());
     Ok(effects)
+}
+
+/// The effect of table `index` (from 0).
+fn effect(index: usize, table: &EffectConfig) -> Result<Applied, Fault> {
+    let of_table = |error: EffectError| Fault::new("effect", format!("table {}: {error}", index + 1));
+    let effect = effects::find(&table.id).ok_or_else(|| of_table(EffectError::Unknown(table.id.clone())))?;
+    let mut parameters: Vec<(&str, f64)> = Vec::new();
+    let mut lists: Vec<(&str, &str)> = Vec::new();
+    for (name, value) in &table.parameters {
+        let of_key = |message: String| Fault::new(format!("effect.{index}.{name}"), message);
+        let given = match value {
+            EffectValue::Number(value) => Given::Number(*value),
+            EffectValue::Numbers(values) => Given::Numbers(values),
+            EffectValue::Other(value) => {
+                let found = value.type_str();
+                return Err(of_key(format!(
+                    "effect {} takes numbers, and lists of numbers, but this is of the type {found}",
+                    table.id
+                )));
+            }
+        };
+        let expanded = effect.expanded(name, given).map_err(|error| of_key(error.to_string()))?;
+        if matches!(value, EffectValue::Numbers(_)) {
+            lists.extend(expanded.iter().map(|(parameter, _)| (*parameter, name.as_str())));
+        }
+        parameters.extend(expanded);
+    }
+    for p in effect.parameters {
+        if table.parameters.contains_key(p.name)
+            && let Some((_, list)) = lists.iter().find(|(name, list)| *name == p.name && *list != p.name)
+        {
+            let twice = EffectError::Twice { id: effect.id, name: p.name, list: (*list).to_owned() };
+            return Err(Fault::new(format!("effect.{index}.{}", p.name), twice.to_string()));
+        }
+    }
+    effect.with(parameters).map_err(of_table)
 }
 
 fn choose<T: Copy>(key: &str, value: Option<&str>, default: T, choices: &[(&str, T)]) -> Result<T, Fault> {
