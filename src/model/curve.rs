@@ -82,8 +82,11 @@ impl Curve {
         Self::new(ends.map(|end| std::array::from_fn(|k| end * (k + 1) as f64 / CURVE_POINTS as f64)), values)
     }
 
-    /// An odd curve up to ±`end`, whose points are equidistant in asinh(x/`warp`): they are close together about the origin.
+    /// An odd curve up to ±`end`, whose points are equidistant in asinh(x/`warp`): they are close together about the origin. 0 everywhere if `end` is 0.
     pub fn odd(end: f64, values: [f64; CURVE_POINTS], warp: f64) -> Self {
+        if end == 0.0 {
+            return Self::ZERO;
+        }
         let step = (end / warp).asinh() / CURVE_POINTS as f64;
         let knots = std::array::from_fn(|k| if k + 1 == CURVE_POINTS { end } else { warp * (step * (k + 1) as f64).sinh() });
         Self::new([knots; 2], [values.map(|value| -value), values])
@@ -162,6 +165,9 @@ mod tests {
         assert!((bent.at(8.0)[0] - 5.0).abs() < 1e-12 && (bent.at(-4.0)[0] + 3.0).abs() < 1e-12);
         let odd = Curve::odd(3.0, [1.0, 2.0, 2.5, 2.6, 2.6], 0.1);
         assert!((odd.at(1.7)[0] + odd.at(-1.7)[0]).abs() < 1e-15);
+        // A curve without extent is none, not one of numbers that are none.
+        let nowhere = Curve::odd(0.0, [1.0; CURVE_POINTS], 0.0);
+        assert!(nowhere.is_zero() && nowhere.at(2.0) == [0.0; 2] && nowhere.steepest() == 0.0);
     }
 
     #[test]

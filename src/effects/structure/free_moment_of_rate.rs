@@ -32,7 +32,7 @@ pub const FREE_MOMENT_OF_RATE: Effect = Effect {
         Parameter {
             name: "range_per_m_s",
             unit: "1/(m·s)",
-            bounds: [0.0, 1e6],
+            bounds: [1e-3, 1e6],
             off: None,
             default: Some(500.0),
             about: "largest rate of curvature of the curve",
