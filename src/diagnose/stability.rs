@@ -28,7 +28,6 @@ pub(super) struct Standing {
 /// How firmly term `index` of `best` stands against the model `without` it and against its `fitted` replacements; other rivals by the linear estimates of
 /// a screening of each of the two.
 pub(super) fn standing(search: &Search, [best, without]: [(&Scored, &Screened); 2], index: usize, fitted: &[&Trial]) -> Standing {
-    // Free forms count in the stead of constants only.
     let is_constant = search.candidate(&best.0.model().terms[index]).is_constant;
     let is_left_by_law = is_constant && is_left_by_law(search, best, without, index);
     let runs = search.split.all();

@@ -102,7 +102,7 @@ pub(super) fn visited(runs: &[Visit]) -> Result<Visited, EngineError> {
     Ok(Visited { volts, curvature, rate, root_moment, slip_speed, ..Visited::NOTHING })
 }
 
-/// Largest elastic curvature of a joint (1/cm), largest rate of curvature (1/(cm·s)) largest moment on the root (dyn·cm) and largest slip speed (cm/s) in a
+/// Largest elastic curvature of a joint (1/cm), largest rate of curvature (1/(cm·s)), largest moment on the root (dyn·cm) and largest slip speed (cm/s) in a
 /// run. Nodes near the floor slip.
 fn extremes(run: &Visit) -> Result<[f64; 4], EngineError> {
     let Visit { robot, start, drive, step: h, steps } = run;
