@@ -40,6 +40,10 @@ fn the_sample_with_a_tip_mass_is_named_and_leaves_what_goes_on() {
     // The noise is 0.05 mm. Seen: 0.0503.
     assert!(d["extended"]["rmse_heldout_mm"].as_f64().unwrap() < 1.2 * 0.05);
     assert!(d["baseline"]["rmse_heldout_mm"].as_f64().unwrap() > 0.3);
+    // A new run is expected within 1.96 σ of the model, which misses nothing else to speak of; as is each of those that judge. Seen: 0.0992 mm.
+    let expected = &d["prediction"];
+    let half = expected["half_width_mm"].as_f64().unwrap();
+    assert!((1.9 * 0.05..2.4 * 0.05).contains(&half) && expected["discrepancy_mm"].as_f64().unwrap() < 0.5 * 0.05, "{expected}");
     // The extended model is an experiment, and its run ends where the data's does.
     let output = sfers(&folder.path().join("d"), &["run", "extended.toml", "--out", "run.csv"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -79,6 +83,7 @@ fn check_report(page: &str, d: &Value, extended: &str) {
     assert_eq!(pages::texts(&document, "pre").concat(), extended.trim_end());
 
     // The first sentence names the tests that fail, if more do than chance explains: three of 80 would in one case of 10,000.
+    assert!(page.contains("of a new run like the") && d["prediction"]["runs"].as_u64().unwrap() >= 2);
     let tests = d["extended"]["residual_tests"].as_array().unwrap();
     let failed: Vec<&str> = tests.iter().filter(|t| t["passed"] == false).map(|t| t["name"].as_str().unwrap()).collect();
     let verdict = document.descendants().find(|n| pages::has_class(n, "verdict")).map(pages::text).unwrap();

@@ -146,6 +146,19 @@ pub struct Stage {
     pub parameters: Vec<Estimate>,
 }
 
+/// How far a value of a new run may be from the extended model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// Half the width of the interval that holds 95 % of the values of new runs like those that judge (mm).
+    pub half_width_mm: f64,
+    /// Standard deviation of the noise in it (mm).
+    pub noise_mm: f64,
+    /// Root mean square of what the model missed in a run beyond the noise (mm).
+    pub discrepancy_mm: f64,
+    /// Number of runs that it was measured on.
+    pub runs: usize,
+}
+
 /// A candidate on top of re-tuned constants.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ranked {
@@ -248,6 +261,8 @@ pub struct Diagnosis {
     pub calibrated: Stage,
     /// The model with all adopted causes.
     pub extended: Stage,
+    /// The interval of a new run about the extended model; none with fewer than two runs that judge.
+    pub prediction: Option<Prediction>,
     /// Candidates on top of re-tuned constants, best first.
     pub candidates: Vec<Ranked>,
     /// Nearly collinear parameters.

@@ -38,6 +38,11 @@ pub(super) const BLOCK: usize = 50;
 /// Two-sided 95 % quantiles of Student's distribution of 1, 2, ... degrees of freedom.
 const STUDENT_95: [f64; 12] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179];
 
+/// Two-sided 95 % quantile of Student's distribution; that of 12 degrees of freedom for more, and that of 1 for none.
+pub(super) fn student_95(freedom: usize) -> f64 {
+    STUDENT_95[freedom.saturating_sub(1).min(STUDENT_95.len() - 1)]
+}
+
 /// Predicted values in each of the cache's two generations.
 const MOST_KEPT: usize = 2_000_000;
 
@@ -513,8 +518,7 @@ impl<'a> Estimator<'a> {
         let count = self.count(runs).max(1) as f64;
         let least = (residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>() / count).max(1.0);
         let (short, whole) = (ratios(BLOCK), ratios(usize::MAX));
-        let t = STUDENT_95[runs.len().saturating_sub(2).min(STUDENT_95.len() - 1)];
-        let known = (t / 1.96_f64).powi(2);
+        let known = (student_95(runs.len().saturating_sub(1)) / 1.96_f64).powi(2);
         // `max` ignores the NaN of a coordinate that the runs do not determine.
         let ratio = |(short, whole): (f64, f64)| 1.0 + known * (least.max(short).max(few * whole) - 1.0);
         Ok(short.into_iter().zip(whole).map(ratio).collect())

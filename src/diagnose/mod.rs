@@ -32,6 +32,7 @@ pub mod observations;
 mod picture;
 pub mod pipeline;
 pub mod plant;
+mod prediction;
 pub mod protocols;
 pub mod quality;
 #[cfg(test)]

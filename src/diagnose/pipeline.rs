@@ -14,6 +14,7 @@ use super::fit::{Estimator, Residuals};
 use super::intervals::{Intervals, intervals_of};
 use super::names;
 use super::plant::{Model, Plant, Signal};
+use super::prediction::{Missed, prediction};
 use super::residual_tests::{describe, residual_tests};
 use super::search::{SOUGHT, Scored, Search, Trial};
 use super::split::{Split, split};
@@ -261,6 +262,7 @@ impl Report<'_, '_> {
             baseline,
             calibrated,
             extended,
+            prediction: prediction(&self.missed()),
             candidates: self.causes.trials.iter().map(|trial| self.ranked(trial)).collect(),
             correlations: intervals.correlations.clone(),
             combinations,
@@ -291,13 +293,26 @@ impl Report<'_, '_> {
 
     /// Mean standard deviation of all values, in the plant's unit.
     fn noise_level(&self) -> f64 {
+        let sigmas: Vec<f64> = self.search.estimator.plant.signals().iter().flat_map(|signal| self.sigmas(signal)).collect();
+        sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64
+    }
+
+    /// Standard deviations of a run's values as they were found, in the plant's unit.
+    fn sigmas(&self, signal: &Signal) -> Vec<f64> {
         let noise = &self.search.estimator.noise;
         let factor = |channel: usize| noise.factors.get(channel).copied().unwrap_or(1.0);
-        let of = |signal: &Signal| -> Vec<f64> {
-            signal.sigmas.iter().zip(&signal.channels).map(|(sigma, channel)| sigma * factor(*channel)).collect()
+        signal.sigmas.iter().zip(&signal.channels).map(|(sigma, channel)| sigma * factor(*channel)).collect()
+    }
+
+    /// What the extended model missed in the runs that judge it.
+    fn missed(&self) -> Vec<Missed> {
+        let of = |(run, plain): (&usize, &Residuals)| {
+            let [sum, count] = self.squares(plain, *run);
+            let sigmas = self.sigmas(&self.search.estimator.plant.signals()[*run]);
+            let noise = sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>() / sigmas.len().max(1) as f64;
+            (count > 0.0).then(|| Missed { residual: sum / count, noise })
         };
-        let sigmas: Vec<f64> = self.search.estimator.plant.signals().iter().flat_map(of).collect();
-        sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64
+        self.unseen.runs.iter().zip(&self.unseen.plain).filter_map(of).collect()
     }
 
     fn ranked(&self, trial: &Trial) -> Ranked {

@@ -165,6 +165,17 @@ fn gain(out: &mut String, d: &Diagnosis, unit: &str) {
         ]);
     }
     out.push_str(&table.html());
+    if let Some(p) = &d.prediction {
+        let _ = writeln!(
+            out,
+            "<p>95 % of the values of a new run like the {} that judge are expected within ±{} {unit} of the extended model: noise of {} {unit}, and \
+             {} {unit} (rms) that the model missed in these runs beyond it.</p>",
+            p.runs,
+            significant(p.half_width_mm, 2),
+            significant(p.noise_mm, 2),
+            significant(p.discrepancy_mm, 2),
+        );
+    }
     let columns = ["nominal", "re-tuned", "extended"].map(|model| format!("#{model} ({unit})"));
     let [nominal, tuned, extended] = columns.each_ref().map(String::as_str);
     let mut table = Table::new(&["run", "role", nominal, tuned, extended, "#extended / noise"]);

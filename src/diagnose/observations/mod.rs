@@ -285,6 +285,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
         baseline: stage(&nominal)?,
         calibrated: stage(best)?,
         extended: stage(best)?,
+        prediction: None,
         candidates: ranked
             .into_iter()
             .map(|fit| Ranked { id: name(fit), form: form(fit), rmse_heldout_mm: (fit.chi2 / count).sqrt(), delta_bic: fit.chi2 + count.ln() - nominal.chi2 })
