@@ -6,6 +6,7 @@
 //! the place stand together if they cost less than the free form.
 
 use super::DiagnoseError;
+use super::bench::Spread;
 use super::diagnosis::Nearest;
 use super::plant::{Candidate, Model, Term};
 use super::search::{PROMISING_IN_PLACE, Scored, Search};
@@ -67,11 +68,20 @@ struct Attempt {
 }
 
 impl<'a> Place<'a> {
-    /// Without faults of the bench but given ones: a camera's scale that differs from run to run is linear about the model with the free form, and
-    /// could stand in for what a name lacks.
+    /// Without faults of the bench but given ones, where the free form does without them: a camera's scale that differs from run to run is linear about
+    /// the model with the free form, and could stand in for what a name lacks. Faults without which more is left than a name may leave stay.
     fn new(search: &'a Search<'a>, best: &Scored, index: usize) -> Result<Self, DiagnoseError> {
+        let place = Self::with_spread(search, best, index, search.estimator.given_spread())?;
+        let lost = place.best.total() - best.total();
+        if lost > (1.0 - LEAST_TAKEN) * (place.bare.total() - place.best.total()) {
+            return Self::with_spread(search, best, index, best.model().spread);
+        }
+        Ok(place)
+    }
+
+    fn with_spread(search: &'a Search<'a>, best: &Scored, index: usize, spread: Spread) -> Result<Self, DiagnoseError> {
         let free = best.model().terms[index].clone();
-        let mut model = Model { spread: search.estimator.given_spread(), ..best.model().clone() };
+        let mut model = Model { spread, ..best.model().clone() };
         let best = search.fitted_at_its_spread(&model)?;
         let is_of_place = |term: &Term| is_of(search, &free, term) && !search.candidate(term).is_constant;
         model.terms.retain(|term| term.candidate != free.candidate && !is_of_place(term));
