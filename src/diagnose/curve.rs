@@ -2,7 +2,7 @@
 
 use super::diagnosis::Curve;
 use super::intervals::Intervals;
-use super::plant::FreeCurve;
+use super::plant::{Free, FreeCurve, Term};
 use super::search::{Scored, Search};
 
 /// The curve of term `index` with its pointwise 95 % band; none of a named cause.
@@ -14,22 +14,8 @@ pub(super) fn curve(search: &Search, best: &Scored, index: usize, found: &Interv
     let term = &best.model().terms[index];
     let plant = search.estimator.plant;
     let FreeCurve { x, y, points } = plant.curve(term)?;
-    let parameters = &search.candidate(term).parameters;
     let first: usize = found.sizes[..index].iter().sum();
-    // Ordinates are linear in the weights.
-    let slopes: Vec<Vec<f64>> = (0..term.x.len())
-        .map(|k| {
-            let mut moved = term.clone();
-            let by = if term.x[k] + parameters[k].scale > parameters[k].bounds[1] {
-                -parameters[k].scale
-            } else {
-                parameters[k].scale
-            };
-            moved.x[k] += by;
-            let moved = plant.curve(&moved).map_or(Vec::new(), |curve| curve.points);
-            moved.iter().zip(&points).map(|(a, b)| (a[1] - b[1]) / by).collect()
-        })
-        .collect();
+    let slopes = slopes(search, term, &points);
     let unresolved = unresolved(&points, &slopes);
     let half = |at: usize| {
         let mut variance = 0.0;
@@ -52,14 +38,31 @@ pub(super) fn curve(search: &Search, best: &Scored, index: usize, found: &Interv
     })
 }
 
-/// What a curve cannot follow, at each of its points. A weight's own point is where it moves the curve most (`slopes`, weights × points).
-fn unresolved(points: &[[f64; 2]], slopes: &[Vec<f64>]) -> Vec<f64> {
+/// Derivatives of a free form's curve by its weights, in which it is linear: weights × `points` of the curve.
+pub(super) fn slopes(search: &Search, term: &Term, points: &[[f64; 2]]) -> Vec<Vec<f64>> {
+    let slope = |(k, free): (usize, &Free)| {
+        let by = if term.x[k] + free.scale > free.bounds[1] { -free.scale } else { free.scale };
+        let mut moved = term.clone();
+        moved.x[k] += by;
+        let moved = search.estimator.plant.curve(&moved).map_or(Vec::new(), |curve| curve.points);
+        moved.iter().zip(points).map(|(a, b)| (a[1] - b[1]) / by).collect()
+    };
+    search.candidate(term).parameters.iter().enumerate().map(slope).collect()
+}
+
+/// The points between which a curve is straight: where each weight moves it most (`slopes`, weights × points), and the origin that it goes through.
+pub(super) fn knots(points: &[[f64; 2]], slopes: &[Vec<f64>]) -> Vec<usize> {
     let largest = |slope: &Vec<f64>| (0..points.len()).max_by(|a, b| slope[*a].abs().total_cmp(&slope[*b].abs()));
     let mut knots: Vec<usize> = slopes.iter().filter_map(largest).collect();
-    // A curve through the origin has a point there, too.
     knots.extend(points.iter().position(|point| *point == [0.0; 2]));
     knots.sort_unstable();
     knots.dedup();
+    knots
+}
+
+/// What a curve cannot follow, at each of its points.
+fn unresolved(points: &[[f64; 2]], slopes: &[Vec<f64>]) -> Vec<f64> {
+    let knots = knots(points, slopes);
     let away: Vec<f64> = knots
         .windows(3)
         .map(|near| {

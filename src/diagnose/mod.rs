@@ -45,6 +45,7 @@ mod response;
 pub mod robot;
 mod run_csv;
 pub mod search;
+mod smoothing;
 pub mod split;
 mod stability;
 mod summary;

@@ -7,6 +7,7 @@ use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Term};
 use super::search::{Scored, Search, VISIBLE};
+use super::smoothing::smoothed;
 use super::split::Split;
 
 /// Structure is left if χ² per value exceeds 1 by this (a misfit of σ/2), ...
@@ -79,6 +80,7 @@ pub(super) fn judge(
         best = coarse.clone();
     }
 
+    best = smoothed(search, best);
     let mut numerics = numerics(search, &best)?;
     // Unexplained structure may bias the coordinates, at most by its share of what the causes explain.
     let free = best.model().terms.iter().flat_map(|term| {
