@@ -17,6 +17,8 @@ use nalgebra::{DMatrix, DVector};
 const LEAST_FALL: f64 = 12.0;
 /// ... and by this share of the number of values, a misfit of σ/3 (rms): less is model error that small faults would take from its cause.
 const LEAST_SHARE: f64 = 0.1;
+/// The mean of a fault over n runs is beyond chance above this, in standard deviations over √n.
+const SHARED_MEAN: f64 = 4.0;
 /// Trial standard deviations of a fault: from the error with which a run determines it, in this ratio, this many.
 const RATIO: f64 = 1.333_521_432_163_324; // 10^(1/8)
 const TRIALS: usize = 40;
@@ -113,6 +115,15 @@ pub struct Moments<'a> {
     channels: usize,
     /// Number of values.
     count: usize,
+}
+
+impl Moments<'_> {
+    /// The estimates û; none if they are not determined.
+    fn faults(&self, spread: &Spread) -> Option<DVector<f64>> {
+        let d = DMatrix::from_diagonal(&DVector::from_vec(spread.columns(self.channels)));
+        let factor = scaled(self.gram, d.diagonal().as_slice()).cholesky()?;
+        Some(&d * factor.solve(&(&d * &self.along)))
+    }
 }
 
 impl Columns {
@@ -276,8 +287,35 @@ fn cost(runs: &[Moments], spread: &Spread) -> f64 {
     sum + log_det(&factor) + size - right.dot(&factor.solve(&right))
 }
 
-/// The standard deviations of largest restricted likelihood; `given` ones are kept. Faults that the data do not ask for are off.
+/// The standard deviations of largest restricted likelihood; `given` ones are kept. Faults that the data do not ask for are off, and so are those whose
+/// mean over the runs is beyond chance: their prior would pay for little more than the differences, and take what all runs share from its cause.
 pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
+    let mut given = *given;
+    loop {
+        let spread = likeliest(runs, &given);
+        let Some(shared) = (0..KINDS).find(|of| given[*of].is_none() && *of != Spread::RATE && is_shared(runs, &spread, *of))
+        else {
+            return spread;
+        };
+        given[shared] = Some(0.0);
+    }
+}
+
+/// True if the mean of a kind's faults over the runs, of one channel, is beyond chance.
+fn is_shared(runs: &[Moments], spread: &Spread, of: usize) -> bool {
+    let sd = spread.of[of];
+    let columns = |run: &Moments| (0..run.along.len()).filter(|column| kind(*column, run.channels) == of).collect::<Vec<_>>();
+    let Some(own) = runs.first().map(columns).filter(|_| sd > 0.0) else { return false };
+    let faults: Vec<DVector<f64>> = runs.iter().filter_map(|run| run.faults(spread)).collect();
+    own.into_iter().any(|column| {
+        let values: Vec<f64> = faults.iter().filter_map(|faults| faults.get(column)).copied().collect();
+        let n = values.len() as f64;
+        (values.iter().sum::<f64>() / n).abs() > SHARED_MEAN * sd / n.sqrt()
+    })
+}
+
+/// The standard deviations of largest restricted likelihood.
+fn likeliest(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
     let mut spread = Spread { of: given.map(|sd| sd.unwrap_or(0.0)) };
     let free: Vec<usize> = (0..KINDS).filter(|kind| given[*kind].is_none()).collect();
     if runs.len() < 3 || free.is_empty() {
@@ -438,6 +476,9 @@ mod tests {
     fn what_all_runs_share_is_left_to_the_causes_but_for_the_rate_of_the_clock() {
         let common = [1e-3, 0.0, 0.0, 0.02, 0.3, 0.0];
         assert!(found([0.0; KINDS], common, 3).is_off());
+        // Zeros of 0.3 mm that differ by a tenth are no zeros of ±0.3 mm, but zeros of ±0.3 mm about 0.1 mm are.
+        assert!(found([0.0, 0.0, 0.0, 0.0, 0.03, 0.0], [0.0, 0.0, 0.0, 0.0, 0.3, 0.0], 3).is_off());
+        assert!(found([0.0, 0.0, 0.0, 0.0, 0.3, 0.0], [0.0, 0.0, 0.0, 0.0, 0.1, 0.0], 3).of[Spread::ZERO] > 0.2);
         let rate = found([0.0; KINDS], [0.0, 2e-3, 0.0, 0.0, 0.0, 0.0], 3).of;
         assert!((1e-3..4e-3).contains(&rate[Spread::RATE]) && rate[Spread::CLOCK] == 0.0, "{rate:?}");
     }

@@ -11,6 +11,9 @@ use super::verdict::LEFT_SHARE;
 /// A model selected without the bench's faults counts if its cost, with ln N for each coordinate, is lower by this.
 const LEAST_COST: f64 = 10.0;
 
+/// A cause takes the place of another with which it is tied if χ² is lower by this.
+const LIKELIER: f64 = 4.0;
+
 /// Result of the search.
 pub(super) struct Causes {
     /// The model with all causes, after the final refit.
@@ -150,7 +153,10 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
             .filter(|(_, trial)| {
                 let other = &trial.scored;
                 let simpler = other.freedom() < best.freedom() && search.is_tied(&best, other);
-                simpler || (other.total() < best.total() && !search.is_tied(other, &best))
+                // Of tied causes the likelier one leads; more parameters have to be worth it.
+                let likelier = other.freedom() <= best.freedom() && other.total() < best.total() - LIKELIER;
+                let better = other.total() < best.total() && !search.is_tied(other, &best);
+                simpler || likelier || (better && (other.freedom() <= best.freedom() || search.is_worth(other, &best)))
             })
             .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
             .map(|(_, trial)| trial.scored.clone());

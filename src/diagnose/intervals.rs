@@ -109,6 +109,9 @@ fn along(search: &Search, model: &Model, covariance: &DMatrix<f64>, k: usize, to
 /// Change of each coordinate with the next coarser discretisation (if it was refined), with the longer time step, and with all constants free, added
 /// in quadrature.
 ///
+/// The discretisation is fitted like a coordinate: where the coarser one raises χ² by more than a 95 % interval allows, the change is that to the end of
+/// such an interval, for which χ² is a parabola.
+///
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.
 pub(super) fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, DiagnoseError> {
@@ -117,18 +120,23 @@ pub(super) fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, Diagn
     let resolutions = search.estimator.plant.resolutions();
     let at = resolutions.iter().position(|r| *r == best.model().resolution).unwrap_or(0);
     let mut moved = vec![0.0; own.len()];
-    let mut others = Vec::new();
-    if !own.is_empty() {
-        (search.progress)("the effect of the discretisation");
-        if at > 0 {
-            others.push(search.ranked(&Model { resolution: resolutions[at - 1], ..best.model().clone() })?);
-        }
-        others.push(search.ranked(&Model { fine: false, ..best.model().clone() })?);
-        others.push(search.ranked(&search.with_constants(best.model()))?);
+    if own.is_empty() {
+        return Ok(moved);
     }
-    for other in &others {
+    (search.progress)("the effect of the discretisation");
+    let mut others = Vec::new();
+    if at > 0 {
+        let coarser = search.fitted(&Model { resolution: resolutions[at - 1], ..best.model().clone() })?;
+        let inflation = search.estimator.inflation(best.model(), &search.split.fit, &covariance(&best.fit.information))?;
+        let allowed = CHI2_95 * inflation.into_iter().fold(1.0, f64::max);
+        let share = (allowed / (coarser.fitted - best.fitted).max(allowed)).sqrt();
+        others.push((coarser, share));
+    }
+    others.push((search.ranked(&Model { fine: false, ..best.model().clone() })?, 1.0));
+    others.push((search.ranked(&search.with_constants(best.model()))?, 1.0));
+    for (other, share) in &others {
         for (moved, (a, b)) in moved.iter_mut().zip(own.iter().zip(values_of(other.model()))) {
-            *moved = f64::hypot(*moved, a - b);
+            *moved = f64::hypot(*moved, share * (a - b));
         }
     }
     Ok(moved)

@@ -2,24 +2,26 @@
 //!
 //! The search adopts a free form where it is worth more than any name: then the place is known and the misfit is taken, whatever the law. Afterwards
 //! each named cause of the place is fitted instead. A name stands if it takes at least [`LEAST_TAKEN`] of what the free form takes on runs that no
-//! parameter was fitted to (detection, localisation, characterisation: Kerschen, Worden, Vakakis, Golinval 2006). Where no single name does, two of
-//! the place stand together if they cost less than the free form.
+//! parameter was fitted to (detection, localisation, characterisation: Kerschen, Worden, Vakakis, Golinval 2006). Where no single name does, or one
+//! does that leaves more than the free form, two or three stand together if they cost less than the free form: the others may be of other places.
 
 use super::DiagnoseError;
 use super::bench::Spread;
 use super::diagnosis::Nearest;
 use super::plant::{Candidate, Model, Term};
-use super::search::{PROMISING_IN_PLACE, Scored, Search};
+use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, VISIBLE};
 
 /// A name stands if it takes this share of what the free form takes on select runs.
 const LEAST_TAKEN: f64 = 0.95;
 /// Held-out runs show a place if the free form takes there this share of what it takes in all, both per value.
 const LEAST_SHOWN: f64 = 0.1;
-/// Named candidates that are fitted in the stead of a free form.
+/// Named candidates of a place that are fitted in the stead of its free form.
 const MOST_NAMES: usize = 7;
-/// Names to which a second one is added, and second ones for each, where none stands alone.
+/// Names to which a second one is added where none stands alone, and second ones of other places for each.
 const MOST_FIRST: usize = 2;
-const MOST_SECOND: usize = 3;
+const MOST_ELSEWHERE: usize = 3;
+/// Sets of two and of three names that are fitted, by linear estimates, where that does not do.
+const MOST_SETS: usize = 3;
 
 /// A model with names where they stand, and the names tried for its free forms, nearest first.
 pub struct Naming {
@@ -89,7 +91,7 @@ impl<'a> Place<'a> {
         Ok(Self { bare: search.fitted_at_its_spread(&model)?, search, best, free })
     }
 
-    /// The model with the best name or the best two, if they stand, and all names that were tried, nearest first.
+    /// The model with the best name or the best few, if they stand, and all names that were tried, nearest first.
     fn named(&self) -> Result<(Option<Scored>, Vec<Nearest>), DiagnoseError> {
         let mut tried = self.single()?;
         tried.sort_by(|a, b| b.taken.total_cmp(&a.taken));
@@ -99,15 +101,30 @@ impl<'a> Place<'a> {
                 nearest.push(Nearest { id: (*name).into(), left: (1.0 - taken).clamp(0.0, 1.0) });
             }
         }
-        let cost = |attempt: &Attempt| self.search.cost(&attempt.scored);
-        let least = |attempts: Vec<Attempt>| attempts.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
         let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
-        let found = match least(standing) {
-            Some(found) => Some(found),
-            None => least(self.pairs(&others)?).filter(|pair| cost(pair) < self.search.cost(&self.best)),
+        let standing = self.least(standing);
+        let found = match &standing {
+            Some(one) if self.is_as_good(one, &self.best) => standing,
+            // What a name leaves beyond the free form may be another cause, or what its law does not follow.
+            Some(one) => {
+                let several = self.several(std::slice::from_ref(one))?;
+                several.filter(|several| self.search.is_worth(&several.scored, &one.scored)).or(standing)
+            }
+            None => self.several(&others)?,
         };
         let found = found.map(|found| found.scored);
         Ok((if found.is_some() { found } else { self.alone()? }, nearest))
+    }
+
+    fn least(&self, attempts: Vec<Attempt>) -> Option<Attempt> {
+        let cost = |attempt: &Attempt| self.search.cost(&attempt.scored);
+        attempts.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
+    }
+
+    /// True if an attempt costs less than a model with the free form, or hardly more: two discretisations of one physics differ by as much.
+    fn is_as_good(&self, attempt: &Attempt, free: &Scored) -> bool {
+        let least = LEAST_GAIN * self.search.estimator.count(&self.search.split.all()) as f64;
+        self.search.cost(&attempt.scored) <= self.search.cost(free) + least
     }
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
@@ -126,39 +143,80 @@ impl<'a> Place<'a> {
             let with = most.and_then(|most| self.attempt(&self.search.with_constants(most.scored.model())));
             tried.extend(with.map(|with| Attempt { name: most.map_or(with.name, |most| most.name), ..with }));
         }
-        let mut without = self.best.model().clone();
-        without.terms.retain(|term| term.candidate != self.free.candidate);
-        if without.terms.len() > self.bare.model().terms.len() {
-            let name = without
-                .terms
-                .iter()
-                .rfind(|term| is_of(self.search, &self.free, term))
-                .map(|term| self.search.candidate(term).id);
-            tried.extend(self.attempt(&without).map(|kept| Attempt { name: name.unwrap_or(kept.name), ..kept }));
+        if let Some(kept) = self.kept() {
+            let of_place = kept.terms.iter().rfind(|term| is_of(self.search, &self.free, term));
+            let name = of_place.map(|term| self.search.candidate(term).id);
+            tried.extend(self.attempt(&kept).map(|kept| Attempt { name: name.unwrap_or(kept.name), ..kept }));
         }
         Ok(tried)
     }
 
-    /// Two names, from the best single ones.
-    fn pairs(&self, tried: &[Attempt]) -> Result<Vec<Attempt>, DiagnoseError> {
-        let mut pairs = Vec::new();
+    /// Two or three names that cost less than the free form, none if none do: beside the best single ones of `tried`, then those that would take most
+    /// together. They may be of other places, as what a free form takes need not be of its place alone.
+    fn several(&self, tried: &[Attempt]) -> Result<Option<Attempt>, DiagnoseError> {
         let mut firsts: Vec<&Attempt> = Vec::new();
         for attempt in tried {
             if firsts.len() < MOST_FIRST && firsts.iter().all(|other| other.name != attempt.name) {
                 firsts.push(attempt);
             }
         }
+        let mut found = Vec::new();
         for first in firsts {
-            let screened = self.search.screen_of(&first.scored, |candidate| self.is_name(candidate))?;
-            let rivals = screened.ranked.iter().filter(|(_, model)| self.is_rival(model));
-            pairs.extend(
-                self.search
-                    .finalists(rivals, MOST_SECOND)
-                    .iter()
-                    .filter_map(|model| self.attempt(&self.search.start_beyond(model, &screened).ok()?)),
-            );
+            found.extend(self.beside(&first.scored)?);
         }
-        Ok(pairs)
+        let mut found = self.least(found);
+        if found.as_ref().is_some_and(|pair| self.is_as_good(pair, &self.best)) {
+            return Ok(found);
+        }
+        // Beside the named causes of the place that are in the model.
+        let kept = self.kept().and_then(|model| self.search.fitted_at_its_spread(&model).ok());
+        let base = kept.as_ref().unwrap_or(&self.bare);
+        let screened = self.search.screen_of(base, |candidate| !(candidate.is_free_form || candidate.is_variant))?;
+        for size in [2, 3] {
+            let sets = self.search.sets(base.model(), &screened, size, |_| true);
+            let sets = sets.iter().take(MOST_SETS).filter_map(|(_, model)| self.search.start_beyond(model, &screened).ok());
+            found = self.least(sets.filter_map(|start| self.attempt(&start)).chain(found).collect());
+            if found.as_ref().is_some_and(|set| self.is_as_good(set, &self.best)) {
+                return Ok(found);
+            }
+        }
+        let Some(near) = found.filter(|set| self.is_near(set)) else { return Ok(None) };
+        // Constants that the free form did not need may make up for what the names lack, ...
+        let free = self.search.fitted_at_its_spread(&self.search.with_constants(self.best.model()))?;
+        let Some(near) = self.attempt(&self.search.with_constants(near.scored.model())) else { return Ok(None) };
+        if self.is_as_good(&near, &free) {
+            return Ok(Some(near));
+        }
+        // ... and the free form may have made up for a wrong cause elsewhere, as a delay of the camera in the place of one of the driver.
+        let replaced = self.search.replacements(&near.scored, MOST_NAMES)?.into_iter();
+        let others = replaced.map(|(_, trial)| Attempt { scored: trial.scored, ..near });
+        Ok(self.least(others.collect()).filter(|set| self.is_as_good(set, &free)))
+    }
+
+    /// True if what an attempt leaves beyond the free form would be minor.
+    fn is_near(&self, attempt: &Attempt) -> bool {
+        let beyond = attempt.scored.total() - self.best.total();
+        beyond < SOUGHT * (self.bare.total() - self.best.total())
+            && beyond < VISIBLE * self.search.estimator.count(&self.search.split.all()) as f64
+    }
+
+    /// A name with a second one beside it.
+    fn beside(&self, first: &Scored) -> Result<Vec<Attempt>, DiagnoseError> {
+        let is_wanted = |candidate: &Candidate| self.is_name(candidate) || !(candidate.is_free_form || candidate.is_variant);
+        let screened = self.search.screen_of(first, is_wanted)?;
+        // Beside a first name that stretches to do the work of two, a linear estimate may miss the second one: those of the place are few.
+        let (of_place, others): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.is_rival(model));
+        let mut seconds = self.search.finalists(of_place, MOST_NAMES);
+        seconds.extend(self.search.finalists(others, MOST_ELSEWHERE));
+        let start = |model: &Model| self.search.start_beyond(model, &screened).ok();
+        Ok(seconds.iter().filter_map(|model| self.attempt(&start(model)?)).collect())
+    }
+
+    /// The model without the free form, with the named causes of its place; none without any.
+    fn kept(&self) -> Option<Model> {
+        let mut without = self.best.model().clone();
+        without.terms.retain(|term| term.candidate != self.free.candidate);
+        (without.terms.len() > self.bare.model().terms.len()).then_some(without)
     }
 
     /// The free form without named causes of its place, if there are some and it takes as much as a name would have to.

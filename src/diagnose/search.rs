@@ -5,11 +5,15 @@
 //!
 //! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 140 lines are tests.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
+use super::fit::{
+    BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, inner, normal_equations, sum_of_squares,
+};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::split::Split;
@@ -50,7 +54,7 @@ const LIKELY_IN_PLACE: f64 = 0.15;
 const LEAST_SIGNIFICANT: usize = 3;
 /// Share of the diagonal by which the linear estimate of a start is regularised.
 const LEAST_RIDGE: f64 = 1e-6;
-/// Two causes are collinear if the squared sine of the angle between their effects on the residuals is below this.
+/// Causes are collinear if the determinant of the cosines between their effects on the residuals is below this: of two, the squared sine.
 const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
@@ -149,6 +153,57 @@ pub struct Screened {
     /// The model's residuals, and the number of its terms.
     residuals: Vec<Residuals>,
     terms: usize,
+}
+
+/// Least squares on some unit columns, by the rows of the Cholesky factor of their cosines.
+#[derive(Default)]
+struct Subset {
+    members: Vec<usize>,
+    rows: Vec<Vec<f64>>,
+    /// The solution of the factor's lower triangle.
+    lower: Vec<f64>,
+    /// Determinant of the cosines.
+    determinant: f64,
+    /// Fall of χ².
+    gain: f64,
+}
+
+impl Subset {
+    /// The subset with column `k`; none if the columns are collinear.
+    fn with(&self, k: usize, cosines: &DMatrix<f64>, right: f64) -> Option<Self> {
+        let mut row: Vec<f64> = Vec::with_capacity(self.members.len() + 1);
+        for (i, own) in self.members.iter().enumerate() {
+            row.push((cosines[(*own, k)] - inner(&self.rows[i][..i], &row)) / self.rows[i][i]);
+        }
+        let square = 1.0 - sum_of_squares(&row);
+        let determinant = square * if self.members.is_empty() { 1.0 } else { self.determinant };
+        if determinant < LEAST_ANGLE {
+            return None;
+        }
+        let lower = (right - inner(&row, &self.lower)) / square.sqrt();
+        row.push(square.sqrt());
+        let and = |all: &[f64], last: f64| all.iter().copied().chain([last]).collect();
+        Some(Self {
+            members: self.members.iter().copied().chain([k]).collect(),
+            rows: self.rows.iter().cloned().chain([row]).collect(),
+            lower: and(&self.lower, lower),
+            determinant,
+            gain: self.gain + lower * lower,
+        })
+    }
+
+    /// The weights of its columns.
+    fn weights(&self) -> Vec<f64> {
+        let n = self.members.len();
+        let mut weights = self.lower.clone();
+        for i in (0..n).rev() {
+            for j in i + 1..n {
+                weights[i] -= self.rows[j][i] * weights[j];
+            }
+            weights[i] /= self.rows[i][i];
+        }
+        weights
+    }
 }
 
 impl Search<'_> {
@@ -561,31 +616,48 @@ impl Search<'_> {
         None
     }
 
-    /// The two wanted causes of a screening that would lower χ² most together, if by more than `least`.
-    pub(super) fn pair(&self, base: &Model, screened: &Screened, least: f64, is_wanted: impl Fn(&Term) -> bool) -> Option<Model> {
-        let Screened { columns, rest, .. } = screened;
+    /// Sets of `size` wanted causes of a screening that would lower χ² most together, by linear estimates, each with the model to fit from; best first,
+    /// one for each choice of causes.
+    pub(super) fn sets(
+        &self,
+        base: &Model,
+        screened: &Screened,
+        size: usize,
+        is_wanted: impl Fn(&Term) -> bool,
+    ) -> Vec<(f64, Model)> {
         let is_law = |term: &Term| !self.candidate(term).is_free_form && !self.candidate(term).is_variant && is_wanted(term);
-        let columns: Vec<_> = columns.iter().filter(|(term, _)| is_law(term)).collect();
-        let sizes: Vec<[f64; 2]> = columns.iter().map(|(_, u)| [u.norm_squared(), u.dot(rest)]).collect();
-        let (mut least, mut pair) = (least, None);
-        for (index, (first, u)) in columns.iter().enumerate() {
-            for (other, (second, v)) in columns[..index].iter().enumerate() {
-                // Least squares of −rest on the two.
-                let ([uu, ur], [vv, vr], uv) = (sizes[index], sizes[other], u.dot(v));
-                let determinant = uu * vv - uv * uv;
-                if self.id(first.candidate) == self.id(second.candidate) || determinant < LEAST_ANGLE * uu * vv {
-                    continue;
-                }
-                let (a, b) = ((uv * vr - vv * ur) / determinant, (uv * ur - uu * vr) / determinant);
-                let ((first, right), (second, also)) = (self.moved(first, a), self.moved(second, b));
-                let gain = -(a * ur + b * vr);
-                if right && also && gain > least {
-                    least = gain;
-                    pair = Some(with(base, [first, second]));
-                }
+        let columns: Vec<_> = screened.columns.iter().filter(|(term, _)| is_law(term)).collect();
+        let norms: Vec<f64> = columns.iter().map(|(_, column)| column.norm()).collect();
+        let cosines =
+            DMatrix::from_fn(columns.len(), columns.len(), |i, j| columns[i].1.dot(&columns[j].1) / (norms[i] * norms[j]));
+        let right: Vec<f64> = columns.iter().zip(&norms).map(|((_, column), norm)| -column.dot(&screened.rest) / norm).collect();
+        let mut found = BTreeMap::<Vec<&str>, (f64, Model)>::new();
+        let mut open = vec![Subset::default()];
+        while let Some(subset) = open.pop() {
+            if subset.members.len() < size {
+                let first = subset.members.last().map_or(0, |last| last + 1);
+                let has = |k: usize| {
+                    subset.members.iter().any(|own| self.id(columns[*own].0.candidate) == self.id(columns[k].0.candidate))
+                };
+                open.extend((first..columns.len()).filter(|k| !has(*k)).filter_map(|k| subset.with(k, &cosines, right[k])));
+                continue;
+            }
+            let mut ids: Vec<&str> = subset.members.iter().map(|k| self.id(columns[*k].0.candidate)).collect();
+            ids.sort_unstable();
+            if found.get(&ids).is_some_and(|(gain, _)| *gain >= subset.gain) {
+                continue;
+            }
+            let moved = |(k, weight): (&usize, f64)| {
+                let (term, is_right) = self.moved(&columns[*k].0, weight / norms[*k]);
+                is_right.then_some(term)
+            };
+            if let Some(terms) = subset.members.iter().zip(subset.weights()).map(moved).collect::<Option<Vec<Term>>>() {
+                found.insert(ids, (subset.gain, with(base, terms)));
             }
         }
-        pair
+        let mut sets: Vec<(f64, Model)> = found.into_values().collect();
+        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
+        sets
     }
 
     /// A start moved along the line from its off value, and true if the bounds allow the direction: a cause of one sign that the data need with the
@@ -809,7 +881,7 @@ impl Search<'_> {
     fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
         // Other pairs are found one cause at a time.
         let least = 2.0 * screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
-        let pair = self.pair(base.model(), screened, least, |_| true)?;
+        let (_, pair) = self.sets(base.model(), screened, 2, |_| true).into_iter().find(|(gain, _)| *gain > least)?;
         if let [.., first, second] = &pair.terms[..] {
             (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
         }

@@ -99,9 +99,10 @@ pub(super) fn pair_in_place(
         let id = search.id(term.candidate);
         id != own.id && !tied.iter().any(|tied| tied == id)
     };
-    let Some(pair) = search.pair(without.model(), screened, PROMISING_PAIR * taken, is_wanted) else { return Ok(None) };
+    let pairs = search.sets(without.model(), screened, 2, is_wanted);
+    let Some((_, pair)) = pairs.first().filter(|(gain, _)| *gain > PROMISING_PAIR * taken) else { return Ok(None) };
     (search.progress)(&format!("two causes in the place of {}", own.id));
-    let start = search.start_beyond(&pair, screened)?;
+    let start = search.start_beyond(pair, screened)?;
     let near = search.ranked_at_its_spread(&start).ok().filter(|both| both.total() < best.total() + NEAR_TIE);
     let Some(both) = near.and_then(|near| search.fitted_at_its_spread(near.model()).ok()) else { return Ok(None) };
     let ids: Vec<&str> = pair.terms.iter().rev().take(2).map(|term| search.id(term.candidate)).collect();
