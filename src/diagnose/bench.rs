@@ -27,6 +27,9 @@ const MOST_PASSES: usize = 6;
 
 /// Kinds of faults, in the order of their columns.
 pub const KINDS: usize = 6;
+/// Largest standard deviations of clock offsets (s), rates, gains and scales that are estimated, and base values: more is no fault of a bench, but what a
+/// model without its causes is linear in by mistake.
+const LARGEST: [f64; SHARED] = [0.05, 0.01, 0.3, 0.3];
 /// Kinds in which predictions are not linear: clock offset, clock rate and gain. Their columns belong to a base value of each run.
 pub const BASED: usize = 3;
 
@@ -55,6 +58,11 @@ impl Spread {
     /// True if all faults are off.
     pub fn is_off(&self) -> bool {
         self.of.iter().all(|sd| *sd == 0.0)
+    }
+
+    /// The faults of a run, the first of a list of all of them, as base values.
+    pub fn base(faults: &[f64]) -> [f64; BASED] {
+        std::array::from_fn(|kind| faults.get(kind).map_or(0.0, |fault| fault.clamp(-LARGEST[kind], LARGEST[kind])))
     }
 
     /// The base values of the kinds that are on; 0 for the others.
@@ -344,8 +352,11 @@ fn likeliest(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
                 (trial, cost(runs, &trial))
             };
             let off = at(0.0);
+            let largest = LARGEST.get(*of).copied().unwrap_or(f64::INFINITY);
             let best = (0..TRIALS)
-                .map(|k| at(least * RATIO.powi(k as i32)))
+                .map(|k| least * RATIO.powi(k as i32))
+                .take_while(|sd| *sd <= largest)
+                .map(at)
                 .min_by(|a, b| a.1.total_cmp(&b.1))
                 .filter(|best| best.1 < off.1 - least_fall)
                 .unwrap_or(off);

@@ -550,7 +550,7 @@ impl<'a> Estimator<'a> {
         let plant = self.plant;
         for (run, faults) in self.faults_of(model)?.into_iter().enumerate() {
             let nuisance = &mut self.nuisances[run];
-            nuisance.base = faults.first_chunk().copied().unwrap_or_default();
+            nuisance.base = Spread::base(&faults);
             // The inputs beyond the last row are not known.
             let signal = &plant.signals()[run];
             let end = signal.times.iter().copied().fold(0.0, f64::max);

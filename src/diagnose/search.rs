@@ -825,25 +825,28 @@ impl Search<'_> {
 
     /// The model with the plain law of the cause of term `index`, unless its own law is significantly better or the plain one cannot be fitted.
     pub(super) fn with_its_plain_law(&self, scored: Scored, index: usize) -> Scored {
-        let term = &scored.model().terms[index];
-        let own = self.candidate(term);
-        if !own.is_variant {
-            return scored;
+        let Some(model) = self.plain_law(scored.model(), index) else { return scored };
+        (self.progress)(&format!("the plain law of {}", self.id(model.terms[index].candidate)));
+        match self.fitted_at_its_spread(&model) {
+            Ok(plain) if !self.is_significant(&scored, &plain) => plain,
+            _ => scored,
         }
+    }
+
+    /// The model with the plain law of the cause of term `index`; none if it has that already.
+    pub(super) fn plain_law(&self, model: &Model, index: usize) -> Option<Model> {
+        let term = &model.terms[index];
+        let own = self.candidate(term);
         let of_plain = |candidate: usize| {
             let plain = &self.estimator.plant.candidates()[candidate];
             let at = |free: &Free| own.parameters.iter().position(|p| p.name == free.name).map(|at| term.x[at]);
             let x = plain.parameters.iter().map(at).collect::<Option<Vec<f64>>>()?;
             (plain.id == own.id && !plain.is_variant).then_some(Term { candidate, x })
         };
-        let Some(plain) = (0..self.estimator.plant.candidates().len()).find_map(of_plain) else { return scored };
-        (self.progress)(&format!("the plain law of {}", own.id));
-        let mut model = scored.model().clone();
+        let plain = (0..self.estimator.plant.candidates().len()).find_map(of_plain).filter(|_| own.is_variant)?;
+        let mut model = model.clone();
         model.terms[index] = plain;
-        match self.fitted_at_its_spread(&model) {
-            Ok(plain) if !self.is_significant(&scored, &plain) => plain,
-            _ => scored,
-        }
+        Some(model)
     }
 
     /// Sets what re-tuned constants leave to what `constants` leaves.

@@ -91,21 +91,43 @@ pub(super) fn pair_in_place(
 ) -> Result<Option<(String, Model)>, DiagnoseError> {
     let own = search.candidate(&best.model().terms[index]);
     let taken = without.total() - best.total();
-    // A cause within the noise, or with several parameters of its own, is not taken apart.
-    if own.is_free_form || taken < NEAR_TIE || own.parameters.len() > 1 {
+    // A cause within the noise is not taken apart.
+    if own.is_free_form || taken < NEAR_TIE {
         return Ok(None);
     }
     let is_wanted = |term: &Term| {
         let id = search.id(term.candidate);
         id != own.id && !tied.iter().any(|tied| tied == id)
     };
+    let name = |a: &str, b: &str| format!("{}+{}", a.min(b), a.max(b));
+    // A law with a further parameter may stand for the plain one with another cause beside it.
+    if let Some(plain) = search.plain_law(best.model(), index) {
+        (search.progress)(&format!("another cause beside the plain law of {}", own.id));
+        let Ok(plain) = search.ranked_at_its_spread(&plain) else { return Ok(None) };
+        let beside = search.screen_of(&plain, |candidate| !(candidate.is_free_form || candidate.is_variant))?;
+        let missing = PROMISING_PAIR * (plain.total() - best.total());
+        let other = |model: &Model| model.terms.last().is_some_and(&is_wanted);
+        let Some((_, model)) = beside.ranked.iter().find(|(gain, model)| *gain > missing && other(model)) else {
+            return Ok(None);
+        };
+        let second = model.terms.last().map_or(own.id, |term| search.id(term.candidate));
+        return Ok(tied_model(search, best, model, &beside)?.map(|both| (name(own.id, second), both)));
+    }
+    // One with several parameters of its own is taken apart no further.
+    if own.parameters.len() > 1 {
+        return Ok(None);
+    }
     let pairs = search.sets(without.model(), screened, 2, is_wanted);
     let Some((_, pair)) = pairs.first().filter(|(gain, _)| *gain > PROMISING_PAIR * taken) else { return Ok(None) };
     (search.progress)(&format!("two causes in the place of {}", own.id));
-    let start = search.start_beyond(pair, screened)?;
-    let near = search.ranked_at_its_spread(&start).ok().filter(|both| both.total() < best.total() + NEAR_TIE);
-    let Some(both) = near.and_then(|near| search.fitted_at_its_spread(near.model()).ok()) else { return Ok(None) };
     let ids: Vec<&str> = pair.terms.iter().rev().take(2).map(|term| search.id(term.candidate)).collect();
-    let set = format!("{}+{}", ids[1].min(ids[0]), ids[1].max(ids[0]));
-    Ok(search.is_tied(best, &both).then(|| (set, both.model().clone())))
+    Ok(tied_model(search, best, pair, screened)?.map(|both| (name(ids[1], ids[0]), both)))
+}
+
+/// A model with terms beyond those that were screened, fitted, if the data cannot tell it from `best`.
+fn tied_model(search: &Search, best: &Scored, model: &Model, screened: &Screened) -> Result<Option<Model>, DiagnoseError> {
+    let start = search.start_beyond(model, screened)?;
+    let near = search.ranked_at_its_spread(&start).ok().filter(|both| both.total() < best.total() + NEAR_TIE);
+    let both = near.and_then(|near| search.fitted_at_its_spread(near.model()).ok());
+    Ok(both.filter(|both| search.is_tied(best, both)).map(|both| both.model().clone()))
 }
