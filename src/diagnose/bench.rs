@@ -27,8 +27,8 @@ const MOST_PASSES: usize = 6;
 
 /// Kinds of faults, in the order of their columns.
 pub const KINDS: usize = 6;
-/// Largest standard deviations of clock offsets (s), rates, gains and scales that are estimated, and base values: more is no fault of a bench, but what a
-/// model without its causes is linear in by mistake.
+/// Largest standard deviations of clock offsets (s), rates, gains and scales that are estimated, and largest base values: more is no fault of a bench, but
+/// the misfit of a model that lacks its causes.
 const LARGEST: [f64; SHARED] = [0.05, 0.01, 0.3, 0.3];
 /// Kinds in which predictions are not linear: clock offset, clock rate and gain. Their columns belong to a base value of each run.
 pub const BASED: usize = 3;

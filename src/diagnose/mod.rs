@@ -48,6 +48,7 @@ pub mod search;
 mod smoothing;
 pub mod split;
 mod stability;
+mod subset;
 mod summary;
 mod ties;
 mod track;

@@ -102,7 +102,7 @@ impl<'a> Place<'a> {
             }
         }
         let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
-        let standing = self.least(standing);
+        let standing = self.simplest(standing);
         let found = match &standing {
             Some(one) if self.is_as_good(one, &self.best) => standing,
             // What a name leaves beyond the free form may be another cause, or what its law does not follow.
@@ -116,15 +116,33 @@ impl<'a> Place<'a> {
         Ok((if found.is_some() { found } else { self.alone()? }, nearest))
     }
 
+    /// The attempt that costs the least.
     fn least(&self, attempts: Vec<Attempt>) -> Option<Attempt> {
         let cost = |attempt: &Attempt| self.search.cost(&attempt.scored);
         attempts.into_iter().min_by(|a, b| cost(a).total_cmp(&cost(b)))
     }
 
-    /// True if an attempt costs less than a model with the free form, or hardly more: two discretisations of one physics differ by as much.
+    /// The attempt that costs the least, or the best one of another cause that has fewer coordinates and costs hardly more.
+    fn simplest(&self, attempts: Vec<Attempt>) -> Option<Attempt> {
+        let cost = |attempt: &Attempt| self.search.cost(&attempt.scored);
+        let mut attempts = attempts;
+        attempts.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let best = attempts.first()?;
+        let is_simpler = |other: &Attempt| {
+            other.name != best.name && other.scored.freedom() < best.scored.freedom() && cost(other) <= cost(best) + self.hardly()
+        };
+        let at = attempts.iter().position(is_simpler).unwrap_or(0);
+        Some(attempts.swap_remove(at))
+    }
+
+    /// True if an attempt costs less than a model with the free form, or hardly more.
     fn is_as_good(&self, attempt: &Attempt, free: &Scored) -> bool {
-        let least = LEAST_GAIN * self.search.estimator.count(&self.search.split.all()) as f64;
-        self.search.cost(&attempt.scored) <= self.search.cost(free) + least
+        self.search.cost(&attempt.scored) <= self.search.cost(free) + self.hardly()
+    }
+
+    /// By how much χ² of two discretisations of one physics may differ.
+    fn hardly(&self) -> f64 {
+        LEAST_GAIN * self.search.estimator.count(&self.search.split.all()) as f64
     }
 
     /// Single names: the promising ones, and those that are in the model beside the free form.

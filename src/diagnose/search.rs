@@ -11,12 +11,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::fit::{
-    BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, inner, normal_equations, sum_of_squares,
-};
+use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::split::Split;
+use super::subset::Subset;
 
 /// A cause is adopted if χ² of the select runs falls by at least this share of the number of values, a misfit of σ/6 (rms), nearly what two
 /// discretisations of the same physics differ by; ...
@@ -54,8 +53,6 @@ const LIKELY_IN_PLACE: f64 = 0.15;
 const LEAST_SIGNIFICANT: usize = 3;
 /// Share of the diagonal by which the linear estimate of a start is regularised.
 const LEAST_RIDGE: f64 = 1e-6;
-/// Causes are collinear if the determinant of the cosines between their effects on the residuals is below this: of two, the squared sine.
-const LEAST_ANGLE: f64 = 1e-3;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
 /// Most alternations between the spread of the bench's faults and the model.
@@ -153,57 +150,6 @@ pub struct Screened {
     /// The model's residuals, and the number of its terms.
     residuals: Vec<Residuals>,
     terms: usize,
-}
-
-/// Least squares on some unit columns, by the rows of the Cholesky factor of their cosines.
-#[derive(Default)]
-struct Subset {
-    members: Vec<usize>,
-    rows: Vec<Vec<f64>>,
-    /// The solution of the factor's lower triangle.
-    lower: Vec<f64>,
-    /// Determinant of the cosines.
-    determinant: f64,
-    /// Fall of χ².
-    gain: f64,
-}
-
-impl Subset {
-    /// The subset with column `k`; none if the columns are collinear.
-    fn with(&self, k: usize, cosines: &DMatrix<f64>, right: f64) -> Option<Self> {
-        let mut row: Vec<f64> = Vec::with_capacity(self.members.len() + 1);
-        for (i, own) in self.members.iter().enumerate() {
-            row.push((cosines[(*own, k)] - inner(&self.rows[i][..i], &row)) / self.rows[i][i]);
-        }
-        let square = 1.0 - sum_of_squares(&row);
-        let determinant = square * if self.members.is_empty() { 1.0 } else { self.determinant };
-        if determinant < LEAST_ANGLE {
-            return None;
-        }
-        let lower = (right - inner(&row, &self.lower)) / square.sqrt();
-        row.push(square.sqrt());
-        let and = |all: &[f64], last: f64| all.iter().copied().chain([last]).collect();
-        Some(Self {
-            members: self.members.iter().copied().chain([k]).collect(),
-            rows: self.rows.iter().cloned().chain([row]).collect(),
-            lower: and(&self.lower, lower),
-            determinant,
-            gain: self.gain + lower * lower,
-        })
-    }
-
-    /// The weights of its columns.
-    fn weights(&self) -> Vec<f64> {
-        let n = self.members.len();
-        let mut weights = self.lower.clone();
-        for i in (0..n).rev() {
-            for j in i + 1..n {
-                weights[i] -= self.rows[j][i] * weights[j];
-            }
-            weights[i] /= self.rows[i][i];
-        }
-        weights
-    }
 }
 
 impl Search<'_> {
