@@ -107,10 +107,10 @@ impl<'a> Place<'a> {
             Some(one) if self.is_as_good(one, &self.best) => standing,
             // What a name leaves beyond the free form may be another cause, or what its law does not follow.
             Some(one) => {
-                let several = self.several(std::slice::from_ref(one))?;
+                let several = self.several(std::slice::from_ref(one));
                 several.filter(|several| self.search.is_worth(&several.scored, &one.scored)).or(standing)
             }
-            None => self.several(&others)?,
+            None => self.several(&others),
         };
         let found = found.map(|found| found.scored);
         Ok((if found.is_some() { found } else { self.alone()? }, nearest))
@@ -170,8 +170,8 @@ impl<'a> Place<'a> {
     }
 
     /// Two or three names that cost less than the free form, none if none do: beside the best single ones of `tried`, then those that would take most
-    /// together. They may be of other places, as what a free form takes need not be of its place alone.
-    fn several(&self, tried: &[Attempt]) -> Result<Option<Attempt>, DiagnoseError> {
+    /// together. They may be of other places, as what a free form takes need not be of its place alone. Models that cannot be simulated are none.
+    fn several(&self, tried: &[Attempt]) -> Option<Attempt> {
         let mut firsts: Vec<&Attempt> = Vec::new();
         for attempt in tried {
             if firsts.len() < MOST_FIRST && firsts.iter().all(|other| other.name != attempt.name) {
@@ -180,35 +180,35 @@ impl<'a> Place<'a> {
         }
         let mut found = Vec::new();
         for first in firsts {
-            found.extend(self.beside(&first.scored)?);
+            found.extend(self.beside(&first.scored).unwrap_or_default());
         }
         let mut found = self.least(found);
         if found.as_ref().is_some_and(|pair| self.is_as_good(pair, &self.best)) {
-            return Ok(found);
+            return found;
         }
         // Beside the named causes of the place that are in the model.
         let kept = self.kept().and_then(|model| self.search.fitted_at_its_spread(&model).ok());
         let base = kept.as_ref().unwrap_or(&self.bare);
-        let screened = self.search.screen_of(base, |candidate| !(candidate.is_free_form || candidate.is_variant))?;
+        let screened = self.search.screen_of(base, |candidate| !(candidate.is_free_form || candidate.is_variant)).ok()?;
         for size in [2, 3] {
             let sets = self.search.sets(base.model(), &screened, size, |_| true);
             let sets = sets.iter().take(MOST_SETS).filter_map(|(_, model)| self.search.start_beyond(model, &screened).ok());
             found = self.least(sets.filter_map(|start| self.attempt(&start)).chain(found).collect());
             if found.as_ref().is_some_and(|set| self.is_as_good(set, &self.best)) {
-                return Ok(found);
+                return found;
             }
         }
-        let Some(near) = found.filter(|set| self.is_near(set)) else { return Ok(None) };
+        let near = found.filter(|set| self.is_near(set))?;
         // Constants that the free form did not need may make up for what the names lack, ...
-        let free = self.search.fitted_at_its_spread(&self.search.with_constants(self.best.model()))?;
-        let Some(near) = self.attempt(&self.search.with_constants(near.scored.model())) else { return Ok(None) };
+        let free = self.search.fitted_at_its_spread(&self.search.with_constants(self.best.model())).ok()?;
+        let near = self.attempt(&self.search.with_constants(near.scored.model()))?;
         if self.is_as_good(&near, &free) {
-            return Ok(Some(near));
+            return Some(near);
         }
         // ... and the free form may have made up for a wrong cause elsewhere, as a delay of the camera in the place of one of the driver.
-        let replaced = self.search.replacements(&near.scored, MOST_NAMES)?.into_iter();
+        let replaced = self.search.replacements(&near.scored, MOST_NAMES).ok()?.into_iter();
         let others = replaced.map(|(_, trial)| Attempt { scored: trial.scored, ..near });
-        Ok(self.least(others.collect()).filter(|set| self.is_as_good(set, &free)))
+        self.least(others.collect()).filter(|set| self.is_as_good(set, &free))
     }
 
     /// True if what an attempt leaves beyond the free form would be minor.

@@ -699,7 +699,7 @@ impl Search<'_> {
             let top = match (top_of(false).cloned(), top_of(true).cloned()) {
                 (Some(named), Some(free)) if self.is_closer(&free, &named) => {
                     let last = named.model().terms.len() - 1;
-                    let named = self.with_its_law(named, last)?;
+                    let named = self.with_its_law(named, last);
                     Some(if self.is_closer(&free, &named) { free } else { named })
                 }
                 (named, free) => named.or(free),
@@ -719,7 +719,7 @@ impl Search<'_> {
             let settled = self.settle(worthy)?;
             best = self.resolve(settled, Convergence::Rank);
             for index in 0..best.model().terms.len() {
-                best = self.with_its_law(best, index)?;
+                best = self.with_its_law(best, index);
             }
             if first.is_none() {
                 first = Some(trials);
@@ -732,14 +732,11 @@ impl Search<'_> {
     }
 
     /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if a better law cannot be fitted to the end.
-    fn with_its_law(&self, scored: Scored, index: usize) -> Result<Scored, DiagnoseError> {
+    fn with_its_law(&self, scored: Scored, index: usize) -> Scored {
         let term = &scored.model().terms[index];
         let own = self.candidate(term);
         if own.is_variant {
-            return Ok(self.with_its_plain_law(scored, index));
+            return self.with_its_plain_law(scored, index);
         }
         let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
@@ -764,9 +761,9 @@ impl Search<'_> {
                 }
             }
         }
-        let Some(best) = best else { return Ok(scored) };
-        let best = self.fitted(best.model())?;
-        Ok(if self.is_significant(&best, &scored) { best } else { scored })
+        // A law that cannot be fitted to the end is none.
+        let best = best.and_then(|best| self.fitted(best.model()).ok());
+        best.filter(|best| self.is_significant(best, &scored)).unwrap_or(scored)
     }
 
     /// The model with the plain law of the cause of term `index`, unless its own law is significantly better or the plain one cannot be fitted.
