@@ -67,7 +67,7 @@ fn weighed(
     let mut tied_with = ties.of(search, best, index);
     let without_it = search.screened(&without, responses, Some(index));
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
-    let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with)?.unzip();
+    let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with).unzip();
     tied_with.extend(set);
     Ok(Weighed { without, standing, tied_with, pair })
 }

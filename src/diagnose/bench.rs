@@ -60,9 +60,12 @@ impl Spread {
         self.of.iter().all(|sd| *sd == 0.0)
     }
 
-    /// The faults of a run, the first of a list of all of them, as base values.
-    pub fn base(faults: &[f64]) -> [f64; BASED] {
-        std::array::from_fn(|kind| faults.get(kind).map_or(0.0, |fault| fault.clamp(-LARGEST[kind], LARGEST[kind])))
+    /// Base values from a list of a run's faults: within the largest ones, or within three standard deviations of these priors if that is more.
+    pub fn base(&self, faults: &[f64]) -> [f64; BASED] {
+        std::array::from_fn(|kind| {
+            let largest = LARGEST[kind].max(3.0 * self.of[kind]);
+            faults.get(kind).map_or(0.0, |fault| fault.clamp(-largest, largest))
+        })
     }
 
     /// The base values of the kinds that are on; 0 for the others.
@@ -125,15 +128,6 @@ pub struct Moments<'a> {
     count: usize,
 }
 
-impl Moments<'_> {
-    /// The estimates û; none if they are not determined.
-    fn faults(&self, spread: &Spread) -> Option<DVector<f64>> {
-        let d = DMatrix::from_diagonal(&DVector::from_vec(spread.columns(self.channels)));
-        let factor = scaled(self.gram, d.diagonal().as_slice()).cholesky()?;
-        Some(&d * factor.solve(&(&d * &self.along)))
-    }
-}
-
 impl Columns {
     /// Columns of a run at base values: `predicted` values and their derivatives by time, `rate`, and by the gain; 1/σ of each value, 0 for those that do not
     /// count; `whiten` replaces residuals (σ) by independent ones.
@@ -184,21 +178,6 @@ impl Columns {
         }
     }
 
-    /// Estimates of all faults, 0 for those that are off, and their covariance factor S^(−½)(…)S^(−½) as log det(I + S GᵀG).
-    fn estimate(&self, spread: &Spread, along: &DVector<f64>) -> (Vec<f64>, f64) {
-        let sds = spread.columns(self.channels);
-        let q = sds.len();
-        // In units of the standard deviations: (I + D GᵀG D) v = D Gᵀ r, u = D v.
-        let right = DVector::from_fn(q, |i, _| sds[i] * along[i]);
-        match scaled(&self.gram, &sds).cholesky() {
-            Some(factor) => {
-                let v = factor.solve(&right);
-                (v.iter().zip(&sds).map(|(v, sd)| v * sd).collect(), log_det(&factor))
-            }
-            None => (vec![0.0; q], 0.0),
-        }
-    }
-
     fn along(&self, residuals: &[f64]) -> DVector<f64> {
         DVector::from_fn(self.columns.len(), |k, _| self.columns[k].iter().zip(residuals).map(|(g, r)| g * r).sum())
     }
@@ -207,7 +186,7 @@ impl Columns {
     pub fn faults(&self, spread: &Spread, residuals: &[f64]) -> Vec<f64> {
         let mut residuals = residuals.to_vec();
         self.about_zero(spread.keep(self.base), &mut residuals);
-        self.estimate(spread, &self.along(&residuals)).0
+        estimate(&self.gram, &self.along(&residuals), &spread.columns(self.channels)).0
     }
 
     /// The faults of a run that are not off, with their posterior standard deviations.
@@ -232,11 +211,11 @@ impl Columns {
             return 0.0;
         }
         self.about_zero(spread.keep(self.base), residuals);
-        let (faults, log_det) = self.estimate(spread, &self.along(residuals));
+        let sds = spread.columns(self.channels);
+        let (faults, log_det) = estimate(&self.gram, &self.along(residuals), &sds);
         for (fault, column) in faults.iter().zip(&self.columns).filter(|(fault, _)| **fault != 0.0) {
             residuals.iter_mut().zip(column).for_each(|(r, g)| *r -= fault * g);
         }
-        let sds = spread.columns(self.channels);
         residuals.extend(faults.iter().zip(sds).map(|(fault, sd)| if sd > 0.0 { fault / sd } else { 0.0 }));
         log_det
     }
@@ -258,6 +237,19 @@ impl Columns {
         let mut residuals = residuals.to_vec();
         self.about_zero(self.base, &mut residuals);
         Moments { gram: &self.gram, along: self.along(&residuals), channels: self.channels, count: residuals.len() }
+    }
+}
+
+/// Estimates û of a run's faults from GᵀG and Gᵀr, 0 for those that are off, and their covariance factor S^(−½)(…)S^(−½) as log det(I + S GᵀG).
+fn estimate(gram: &DMatrix<f64>, along: &DVector<f64>, sds: &[f64]) -> (Vec<f64>, f64) {
+    // In units of the standard deviations: (I + D GᵀG D) v = D Gᵀ r, u = D v.
+    let right = DVector::from_fn(sds.len(), |i, _| sds[i] * along[i]);
+    match scaled(gram, sds).cholesky() {
+        Some(factor) => {
+            let v = factor.solve(&right);
+            (v.iter().zip(sds).map(|(v, sd)| v * sd).collect(), log_det(&factor))
+        }
+        None => (vec![0.0; sds.len()], 0.0),
     }
 }
 
@@ -314,7 +306,8 @@ fn is_shared(runs: &[Moments], spread: &Spread, of: usize) -> bool {
     let sd = spread.of[of];
     let columns = |run: &Moments| (0..run.along.len()).filter(|column| kind(*column, run.channels) == of).collect::<Vec<_>>();
     let Some(own) = runs.first().map(columns).filter(|_| sd > 0.0) else { return false };
-    let faults: Vec<DVector<f64>> = runs.iter().filter_map(|run| run.faults(spread)).collect();
+    let estimated = |run: &Moments| estimate(run.gram, &run.along, &spread.columns(run.channels)).0;
+    let faults: Vec<Vec<f64>> = runs.iter().map(estimated).collect();
     own.into_iter().any(|column| {
         let values: Vec<f64> = faults.iter().filter_map(|faults| faults.get(column)).copied().collect();
         let n = values.len() as f64;
@@ -481,6 +474,14 @@ mod tests {
             assert!(no_clock(fault.kind) || (fault.value == 0.0 && fault.sd == sds.of[fault.kind]), "{fault:?}");
         }
         assert!(columns(3.0).found(&sds, &r)[0].value > 2e-3);
+    }
+
+    #[test]
+    fn base_values_stay_within_what_a_bench_can_do_or_is_given() {
+        let faults = [0.08, 0.02, -9.0, 0.5];
+        assert_eq!(Spread::default().base(&faults), [0.05, 0.01, -0.3]);
+        // A clock that is given as ±30 ms may be 80 ms off.
+        assert_eq!(Spread { of: [0.03, 0.0, 0.0, 0.0, 0.0, 0.0] }.base(&faults), [0.08, 0.01, -0.3]);
     }
 
     #[test]

@@ -156,7 +156,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
                 // Of tied causes the likelier one leads; more parameters have to be worth it.
                 let likelier = other.freedom() <= best.freedom() && other.total() < best.total() - LIKELIER;
                 let better = other.total() < best.total() && !search.is_tied(other, &best);
-                simpler || likelier || (better && (other.freedom() <= best.freedom() || search.is_worth(other, &best)))
+                simpler || likelier || (better && search.is_worth(other, &best))
             })
             .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
             .map(|(_, trial)| trial.scored.clone());

@@ -547,10 +547,10 @@ impl<'a> Estimator<'a> {
         // Halves of central differences, in s and in the gain.
         const HALF_STEP: f64 = 1e-4;
         const HALF_GAIN: f64 = 5e-3;
-        let plant = self.plant;
+        let (plant, given) = (self.plant, self.given_spread());
         for (run, faults) in self.faults_of(model)?.into_iter().enumerate() {
             let nuisance = &mut self.nuisances[run];
-            nuisance.base = Spread::base(&faults);
+            nuisance.base = given.base(&faults);
             // The inputs beyond the last row are not known.
             let signal = &plant.signals()[run];
             let end = signal.times.iter().copied().fold(0.0, f64::max);

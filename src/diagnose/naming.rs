@@ -3,7 +3,7 @@
 //! The search adopts a free form where it is worth more than any name: then the place is known and the misfit is taken, whatever the law. Afterwards
 //! each named cause of the place is fitted instead. A name stands if it takes at least [`LEAST_TAKEN`] of what the free form takes on runs that no
 //! parameter was fitted to (detection, localisation, characterisation: Kerschen, Worden, Vakakis, Golinval 2006). Where no single name does, or one
-//! does that leaves more than the free form, two or three stand together if they cost less than the free form: the others may be of other places.
+//! does that leaves more than the free form, two or three stand together if they cost no more than the free form, or hardly more: the others may be of other places.
 
 use super::DiagnoseError;
 use super::bench::Spread;
@@ -129,7 +129,9 @@ impl<'a> Place<'a> {
         attempts.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
         let best = attempts.first()?;
         let is_simpler = |other: &Attempt| {
-            other.name != best.name && other.scored.freedom() < best.scored.freedom() && cost(other) <= cost(best) + self.hardly()
+            other.name != best.name
+                && other.scored.freedom() < best.scored.freedom()
+                && cost(other) <= cost(best) + self.tolerance()
         };
         let at = attempts.iter().position(is_simpler).unwrap_or(0);
         Some(attempts.swap_remove(at))
@@ -137,11 +139,11 @@ impl<'a> Place<'a> {
 
     /// True if an attempt costs less than a model with the free form, or hardly more.
     fn is_as_good(&self, attempt: &Attempt, free: &Scored) -> bool {
-        self.search.cost(&attempt.scored) <= self.search.cost(free) + self.hardly()
+        self.search.cost(&attempt.scored) <= self.search.cost(free) + self.tolerance()
     }
 
     /// By how much χ² of two discretisations of one physics may differ.
-    fn hardly(&self) -> f64 {
+    fn tolerance(&self) -> f64 {
         LEAST_GAIN * self.search.estimator.count(&self.search.split.all()) as f64
     }
 
@@ -169,7 +171,7 @@ impl<'a> Place<'a> {
         Ok(tried)
     }
 
-    /// Two or three names that cost less than the free form, none if none do: beside the best single ones of `tried`, then those that would take most
+    /// Two or three names that are as good as the free form, none if none are: beside the best single ones of `tried`, then those that would take most
     /// together. They may be of other places, as what a free form takes need not be of its place alone. Models that cannot be simulated are none.
     fn several(&self, tried: &[Attempt]) -> Option<Attempt> {
         let mut firsts: Vec<&Attempt> = Vec::new();

@@ -1,6 +1,5 @@
 //! Ties: other causes, or two others together, that explain the data as well as an adopted one.
 
-use super::DiagnoseError;
 use super::plant::{Model, Term};
 use super::search::{Scored, Screened, Search, Trial};
 
@@ -78,56 +77,66 @@ impl Ties {
 }
 
 /// Two causes together that the data cannot tell from term `index` of `best`, which `without` lacks: their ids with a plus sign, and the model with them;
-/// none if there are none, or if one of them is tied alone.
-///
-/// # Errors
-/// [`DiagnoseError`] if `without` cannot be simulated.
+/// none if there are none, if one of them is tied alone, or if they cannot be simulated.
 pub(super) fn pair_in_place(
     search: &Search,
     best: &Scored,
     (without, screened): (&Scored, &Screened),
     index: usize,
     tied: &[String],
-) -> Result<Option<(String, Model)>, DiagnoseError> {
+) -> Option<(String, Model)> {
     let own = search.candidate(&best.model().terms[index]);
     let taken = without.total() - best.total();
     // A cause within the noise is not taken apart.
     if own.is_free_form || taken < NEAR_TIE {
-        return Ok(None);
+        return None;
     }
     let is_wanted = |term: &Term| {
         let id = search.id(term.candidate);
         id != own.id && !tied.iter().any(|tied| tied == id)
     };
-    let name = |a: &str, b: &str| format!("{}+{}", a.min(b), a.max(b));
-    // A law with a further parameter may stand for the plain one with another cause beside it.
     if let Some(plain) = search.plain_law(best.model(), index) {
-        (search.progress)(&format!("another cause beside the plain law of {}", own.id));
-        let Ok(plain) = search.ranked_at_its_spread(&plain) else { return Ok(None) };
-        let beside = search.screen_of(&plain, |candidate| !(candidate.is_free_form || candidate.is_variant))?;
-        let missing = PROMISING_PAIR * (plain.total() - best.total());
-        let other = |model: &Model| model.terms.last().is_some_and(&is_wanted);
-        let Some((_, model)) = beside.ranked.iter().find(|(gain, model)| *gain > missing && other(model)) else {
-            return Ok(None);
-        };
-        let second = model.terms.last().map_or(own.id, |term| search.id(term.candidate));
-        return Ok(tied_model(search, best, model, &beside)?.map(|both| (name(own.id, second), both)));
+        return beside_plain_law(search, best, &plain, own.id, is_wanted);
     }
     // One with several parameters of its own is taken apart no further.
     if own.parameters.len() > 1 {
-        return Ok(None);
+        return None;
     }
     let pairs = search.sets(without.model(), screened, 2, is_wanted);
-    let Some((_, pair)) = pairs.first().filter(|(gain, _)| *gain > PROMISING_PAIR * taken) else { return Ok(None) };
+    let (_, pair) = pairs.first().filter(|(gain, _)| *gain > PROMISING_PAIR * taken)?;
     (search.progress)(&format!("two causes in the place of {}", own.id));
-    let ids: Vec<&str> = pair.terms.iter().rev().take(2).map(|term| search.id(term.candidate)).collect();
-    Ok(tied_model(search, best, pair, screened)?.map(|both| (name(ids[1], ids[0]), both)))
+    let [.., first, second] = &pair.terms[..] else { return None };
+    let set = in_words(search.id(first.candidate), search.id(second.candidate));
+    tied_model(search, best, pair, screened).map(|both| (set, both))
+}
+
+/// The `plain` law of the cause `own` with another cause beside it, for which the law with a further parameter in `best` may stand.
+fn beside_plain_law(
+    search: &Search,
+    best: &Scored,
+    plain: &Model,
+    own: &str,
+    is_wanted: impl Fn(&Term) -> bool,
+) -> Option<(String, Model)> {
+    (search.progress)(&format!("another cause beside the plain law of {own}"));
+    let plain = search.ranked_at_its_spread(plain).ok()?;
+    let screened = search.screen_of(&plain, |candidate| !(candidate.is_free_form || candidate.is_variant)).ok()?;
+    let promising = PROMISING_PAIR * (plain.total() - best.total());
+    let is_other = |model: &Model| model.terms.last().is_some_and(&is_wanted);
+    let (_, model) = screened.ranked.iter().find(|(gain, model)| *gain > promising && is_other(model))?;
+    let set = in_words(own, search.id(model.terms.last()?.candidate));
+    tied_model(search, best, model, &screened).map(|both| (set, both))
+}
+
+/// Two ids in alphabetic order, with a plus sign.
+fn in_words(a: &str, b: &str) -> String {
+    format!("{}+{}", a.min(b), a.max(b))
 }
 
 /// A model with terms beyond those that were screened, fitted, if the data cannot tell it from `best`.
-fn tied_model(search: &Search, best: &Scored, model: &Model, screened: &Screened) -> Result<Option<Model>, DiagnoseError> {
-    let start = search.start_beyond(model, screened)?;
-    let near = search.ranked_at_its_spread(&start).ok().filter(|both| both.total() < best.total() + NEAR_TIE);
-    let both = near.and_then(|near| search.fitted_at_its_spread(near.model()).ok());
-    Ok(both.filter(|both| search.is_tied(best, both)).map(|both| both.model().clone()))
+fn tied_model(search: &Search, best: &Scored, model: &Model, screened: &Screened) -> Option<Model> {
+    let start = search.start_beyond(model, screened).ok()?;
+    let near = search.ranked_at_its_spread(&start).ok().filter(|both| both.total() < best.total() + NEAR_TIE)?;
+    let both = search.fitted_at_its_spread(near.model()).ok()?;
+    search.is_tied(best, &both).then(|| both.model().clone())
 }
