@@ -288,15 +288,14 @@ fn cost(runs: &[Moments], spread: &Spread) -> f64 {
 }
 
 /// The standard deviations of largest restricted likelihood; `given` ones are kept. Faults that the data do not ask for are off, and so are those whose
-/// mean over the runs is beyond chance: their prior would pay for little more than the differences, and take what all runs share from its cause.
-pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS]) -> Spread {
+/// mean over the runs is beyond chance: their prior would pay for little more than the differences, and take what all runs share from its cause. Those
+/// that are `established` stay: a mean of their own is one that the model's coordinates have not taken up yet.
+pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS], established: &Spread) -> Spread {
     let mut given = *given;
     loop {
         let spread = likeliest(runs, &given);
-        let Some(shared) = (0..KINDS).find(|of| given[*of].is_none() && *of != Spread::RATE && is_shared(runs, &spread, *of))
-        else {
-            return spread;
-        };
+        let may_be_shared = |of: usize| given[of].is_none() && established.of[of] == 0.0 && of != Spread::RATE;
+        let Some(shared) = (0..KINDS).find(|of| may_be_shared(*of) && is_shared(runs, &spread, *of)) else { return spread };
         given[shared] = Some(0.0);
     }
 }
@@ -434,6 +433,11 @@ mod tests {
 
     /// Eleven runs with faults of the given standard deviations, and `common` to all; −2 log likelihood decides.
     fn found(sds: [f64; KINDS], common: [f64; KINDS], seed: u64) -> Spread {
+        found_beside(sds, common, seed, &Spread::default())
+    }
+
+    /// The same where some faults are established.
+    fn found_beside(sds: [f64; KINDS], common: [f64; KINDS], seed: u64, established: &Spread) -> Spread {
         let mut random = Random::new(seed);
         let runs: Vec<Columns> = (0..11).map(|k| columns(1.0 + 1.7 * f64::from(k))).collect();
         let moments = runs.iter().map(|own| {
@@ -445,7 +449,7 @@ mod tests {
             }
             own.moments(&r)
         });
-        spread(&moments.collect::<Vec<_>>(), &[None; KINDS])
+        spread(&moments.collect::<Vec<_>>(), &[None; KINDS], established)
     }
 
     #[test]
@@ -491,6 +495,10 @@ mod tests {
         // Zeros of 0.3 mm that differ by a tenth are no zeros of ±0.3 mm, but zeros of ±0.3 mm about 0.1 mm are.
         assert!(found([0.0, 0.0, 0.0, 0.0, 0.03, 0.0], [0.0, 0.0, 0.0, 0.0, 0.3, 0.0], 3).is_off());
         assert!(found([0.0, 0.0, 0.0, 0.0, 0.3, 0.0], [0.0, 0.0, 0.0, 0.0, 0.1, 0.0], 3).of[Spread::ZERO] > 0.2);
+        // Established zeros stay.
+        let zeros = Spread { of: [0.0, 0.0, 0.0, 0.0, 0.1, 0.0] };
+        let established = found_beside([0.0, 0.0, 0.0, 0.0, 0.03, 0.0], [0.0, 0.0, 0.0, 0.0, 0.3, 0.0], 3, &zeros);
+        assert!(established.of[Spread::ZERO] > 0.02 && established.of[Spread::CLOCK] == 0.0, "{established:?}");
         let rate = found([0.0; KINDS], [0.0, 2e-3, 0.0, 0.0, 0.0, 0.0], 3).of;
         assert!((1e-3..4e-3).contains(&rate[Spread::RATE]) && rate[Spread::CLOCK] == 0.0, "{rate:?}");
     }

@@ -44,6 +44,7 @@ pub(super) struct Causes {
 /// [`DiagnoseError`] if a model cannot be simulated.
 pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
+    search.estimator.is_calibrated = true;
     let without = search.estimator.given_spread();
     let has_faults = calibrated.model().spread != without;
     search.estimator.held_spread = has_faults.then_some(without);
@@ -150,9 +151,12 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         replaced = search.replacements(&best, 4)?;
         let better = replaced
             .iter()
-            .filter(|(_, trial)| {
+            .filter(|(removed, trial)| {
                 let other = &trial.scored;
-                let simpler = other.freedom() < best.freedom() && search.is_tied(&best, other);
+                // A law with a further parameter gives way to another cause that does without one and leaves hardly more.
+                let has_further = best.model().terms.iter().any(|t| t.candidate == *removed && search.candidate(t).is_variant);
+                let simpler = other.freedom() < best.freedom()
+                    && (search.is_tied(&best, other) || (has_further && !search.is_worth(&best, other)));
                 // Of tied causes the likelier one leads; more parameters have to be worth it.
                 let likelier = other.freedom() <= best.freedom() && other.total() < best.total() - LIKELIER;
                 let better = other.total() < best.total() && !search.is_tied(other, &best);

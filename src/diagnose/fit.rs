@@ -131,6 +131,8 @@ pub struct Estimator<'a> {
     pub used: Vec<Vec<bool>>,
     /// Spread of the bench's faults while it is not estimated.
     pub held_spread: Option<Spread>,
+    /// True once the constants are calibrated: a fault that is on is no longer switched off because all runs share it.
+    pub is_calibrated: bool,
     /// Columns of the bench's faults of each run; none before the first [`set_faults`](Self::set_faults).
     faults: Vec<Columns>,
     /// The noise that residuals are whitened for.
@@ -195,7 +197,16 @@ impl<'a> Estimator<'a> {
             .map(|run| Nuisance { shares: vec![1.0; plant.nuisances(run)], ..Nuisance::default() })
             .collect();
         let used = plant.signals().iter().map(|signal| vec![true; signal.values.len()]).collect();
-        Self { plant, nuisances, used, held_spread: None, faults: Vec::new(), noise: Noise::default(), kept: Mutex::default() }
+        Self {
+            plant,
+            nuisances,
+            used,
+            held_spread: None,
+            is_calibrated: false,
+            faults: Vec::new(),
+            noise: Noise::default(),
+            kept: Mutex::default(),
+        }
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Arc<Vec<f64>>, DiagnoseError> {
@@ -626,7 +637,8 @@ impl<'a> Estimator<'a> {
         let moments = with_columns
             .map(|(run, columns)| Ok(columns.moments(&self.misfit(model, run, &self.nuisances[run])?)))
             .collect::<Result<Vec<_>, DiagnoseError>>()?;
-        Ok(bench::spread(&moments, &self.plant.bench()))
+        let established = if self.is_calibrated { model.spread } else { Spread::default() };
+        Ok(bench::spread(&moments, &self.plant.bench(), &established))
     }
 
     /// Masks single values whose residuals stand far above those around them in their channel, as after a tracker's slip, and returns their number.

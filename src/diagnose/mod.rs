@@ -33,6 +33,7 @@ mod picture;
 pub mod pipeline;
 pub mod plant;
 mod prediction;
+mod projection;
 pub mod protocols;
 pub mod quality;
 #[cfg(test)]

@@ -14,6 +14,7 @@ use super::DiagnoseError;
 use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
+use super::projection::{tangents, without_directions};
 use super::split::Split;
 use super::subset::Subset;
 
@@ -1062,29 +1063,6 @@ fn least_squares(columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Opti
 /// The residuals of runs, one after the other.
 pub(super) fn joined(scored: &Scored, runs: &[usize]) -> DVector<f64> {
     DVector::from_vec(runs.iter().flat_map(|run| scored.residuals[*run].iter().copied()).collect())
-}
-
-/// Orthonormal basis of derivatives.
-fn tangents(derivatives: &Derivatives) -> Vec<DVector<f64>> {
-    let mut orthonormal: Vec<DVector<f64>> = Vec::new();
-    for column in derivatives.iter().map(|column| DVector::from_vec(column.concat())) {
-        let rest = without_directions(&orthonormal, &column);
-        let left = rest.norm();
-        if left > 1e-6 * column.norm() && left > 0.0 {
-            orthonormal.push(rest / left);
-        }
-    }
-    orthonormal
-}
-
-/// The part of a vector that is orthogonal to orthonormal ones.
-pub(super) fn without_directions(unit: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
-    let mut rest = vector.clone();
-    for direction in unit {
-        let along = direction.dot(&rest);
-        rest.axpy(-along, direction, 1.0);
-    }
-    rest
 }
 
 /// Covariance of a fit's coordinates (coordinates × coordinates); infinite variances for those that the data do not determine.

@@ -4,7 +4,8 @@ use nalgebra::DVector;
 
 use super::fit::sum_of_squares;
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_GAIN, Scored, Screened, Search, Trial, joined, without_directions};
+use super::projection::without_directions;
+use super::search::{LEAST_GAIN, Scored, Screened, Search, Trial, joined};
 
 /// Fewest runs that are resampled.
 const LEAST_RUNS: usize = 4;

@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 use sfers::engine::{BulletEngine, Engine};
-use sfers::experiment::{self, Source};
+use sfers::experiment::{self, Experiment, Source};
 use sfers::model::Robot;
 
 use super::generator::effects::{loop_width, put};
@@ -23,16 +23,16 @@ use super::generator::protocol::Plays;
 use super::generator::random::Random;
 
 /// Time between rows (s).
-const ROW: f64 = 5e-3;
+pub const ROW: f64 = 5e-3;
 /// Bullet's steps per row, of 2e-5 s: half of what its explicit torque law stands.
-const STEPS_PER_ROW: usize = 250;
+pub const STEPS_PER_ROW: usize = 250;
 /// The same where impacts return something. What a foot's load adds to its speed in a step is reflected as well if it is more than 0.2 cm/s (7000 dyn
 /// on the 0.35 g of a corner: 0.4 cm/s in 2e-5 s): feet under load chatter, and the robot creeps by half a millimetre a second. At 5e-6 s that is gone.
 const STEPS_PER_ROW_WITH_RESTITUTION: usize = 1000;
-const ROWS: usize = 241;
+pub const ROWS: usize = 241;
 /// Rows that the robot is left alone on the floor before a run.
-const REST: usize = 80;
-const ACTUATORS: usize = 3;
+pub const REST: usize = 80;
+pub const ACTUATORS: usize = 3;
 /// Markers along the robot (cm).
 const MARKERS: [(&str, f64); 3] = [("left", 0.0), ("middle", 15.0), ("right", 30.0)];
 
@@ -184,12 +184,17 @@ pub fn hide(id: &str, size: usize, seed: u64) -> (Floor, Vec<(&'static str, f64)
 /// Markers of a run without noise: x and z of each in mm, row after row.
 pub type Film = Vec<[f64; 2 * MARKERS.len()]>;
 
-/// The robot as it is on the bench.
-pub fn robot(hidden: &Floor) -> Robot {
+/// The nominal robot, in an experiment.
+pub fn experiment() -> Experiment {
     let text = format!(
         "{ROBOT}\n[drive]\nwaveform = \"dc\"\nvoltages_v = [0, 0, 0]\n\n[simulation]\ntime_step_s = 1e-5\nduration_s = 1\n"
     );
-    let mut robot = experiment::experiment(&Source::from_text("the bench", &text)).expect("the robot of the bench").robot;
+    experiment::experiment(&Source::from_text("the bench", &text)).expect("the robot of the bench")
+}
+
+/// The robot as it is on the bench.
+pub fn robot(hidden: &Floor) -> Robot {
+    let mut robot = experiment().robot;
     robot.extensions.slope = hidden.slope_deg.to_radians();
     robot.friction.ground *= hidden.friction;
     robot.extensions.stick_slip.ratio = hidden.static_ratio;
@@ -248,7 +253,7 @@ fn keep_in_plane(engine: &mut BulletEngine) {
 }
 
 /// The markers on the camera's picture.
-fn seen(hidden: &Floor, lengths: &[f64], nodes: &[f64]) -> [f64; 2 * MARKERS.len()] {
+pub fn seen(hidden: &Floor, lengths: &[f64], nodes: &[f64]) -> [f64; 2 * MARKERS.len()] {
     let (sin, cos) = hidden.tilt_deg.to_radians().sin_cos();
     let mut row = [0.0; 2 * MARKERS.len()];
     for (at, (_, arc)) in row.chunks_exact_mut(2).zip(MARKERS) {
