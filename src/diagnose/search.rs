@@ -374,6 +374,10 @@ impl Search<'_> {
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
     fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
+        self.is_significant_on(runs, more, less)
+    }
+
+    fn is_significant_on(&self, runs: &[usize], more: &Scored, less: &Scored) -> bool {
         self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
     }
 
@@ -954,11 +958,12 @@ impl Search<'_> {
         order.into_iter().take(LEAST_SIGNIFICANT).map(|(_, index)| index).collect()
     }
 
-    /// True if `less`, a model with one term less, leaves out too much: new physics has to be worth it, a constant has to be significant only.
+    /// True if `less`, a model with one term less, leaves out too much: new physics has to be worth it on the select runs, a constant has to be significant
+    /// only, on all runs, as one run may show it more than the others.
     fn is_needed(&self, more: &Scored, less: &Scored) -> bool {
         let kept = |term: &Term| less.model().terms.iter().any(|other| other.candidate == term.candidate);
         let is_constant = more.model().terms.iter().any(|term| !kept(term) && self.candidate(term).is_constant);
-        if is_constant { self.is_significant(more, less) } else { self.is_worth(more, less) }
+        if is_constant { self.is_significant_on(&self.split.all(), more, less) } else { self.is_worth(more, less) }
     }
 
     /// Replaces every cause by other candidates, `most` of each: the candidate that is removed, and the trial.
