@@ -103,7 +103,7 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     causes.best = search.backward(best)?;
     let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
     if ids(causes.best.model()) != ids(&before) {
-        causes.replaced = search.replacements(&causes.best, 4)?;
+        causes.replaced = search.replacements(&causes.best, 4).unwrap_or_default();
     }
     causes.coarse_total = causes.best.total();
     Ok(())
@@ -148,7 +148,8 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         if is_insufficient || best.model().terms.is_empty() {
             break;
         }
-        replaced = search.replacements(&best, 4)?;
+        // A model at the edge of what can be simulated has no derivatives to compare others by.
+        replaced = search.replacements(&best, 4).unwrap_or_default();
         let better = replaced
             .iter()
             .filter(|(removed, trial)| {

@@ -20,6 +20,8 @@ use super::plant::{Model, Nuisance, Plant};
 
 /// Step of finite differences as a share of a parameter's scale.
 const DIFFERENCE: f64 = 0.02;
+/// Steps, in its place, that are tried one after the other where a model cannot be simulated after it, as shares of it.
+const STEPS_OF_EDGES: [f64; 3] = [-1.0, 0.1, -0.1];
 /// A fit has converged when χ² falls by less than this share of the number of values, ...
 const TOLERANCE: f64 = 1e-6;
 /// ... or by less than this share of χ² beyond the number of values: for full convergence, and to rank models.
@@ -342,22 +344,27 @@ impl<'a> Estimator<'a> {
         let coordinates = &coordinates(model)[known.len()..];
         let tasks: Vec<(usize, usize)> =
             (0..=coordinates.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
-        let results: Vec<Residuals> = tasks
+        // Residuals after a step, and the step: backward or shorter where a model cannot be simulated, as at the edge of a robot's equilibria.
+        let results: Vec<(Residuals, f64)> = tasks
             .par_iter()
             .map(|(column, run)| {
-                let mut model = model.clone();
-                if let Some((term, parameter)) = column.checked_sub(1).map(|at| coordinates[at]) {
-                    let step = self.step(&model, (term, parameter));
-                    model.terms[term].x[parameter] += step;
-                }
-                self.residuals(&model, *run)
+                let Some((term, parameter)) = column.checked_sub(1).map(|at| coordinates[at]) else {
+                    return Ok((self.residuals(model, *run)?, 0.0));
+                };
+                let after = |step: f64| {
+                    let mut moved = model.clone();
+                    moved.terms[term].x[parameter] += step;
+                    Ok((self.residuals(&moved, *run)?, step))
+                };
+                let step = self.step(model, (term, parameter));
+                let others = |error: DiagnoseError| STEPS_OF_EDGES.iter().find_map(|share| after(share * step).ok()).ok_or(error);
+                after(step).or_else(others)
             })
-            .collect::<Result<_, _>>()?;
-        let mut columns = results.chunks(runs.len()).map(<[Residuals]>::to_vec);
-        let plain = columns.next().unwrap_or_default();
-        let own = columns.zip(coordinates).map(|(shifted, coordinate)| {
-            let step = self.step(model, *coordinate);
-            let of_run = |(a, b): (&Residuals, &Residuals)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect();
+            .collect::<Result<_, DiagnoseError>>()?;
+        let mut columns = results.chunks(runs.len());
+        let plain: Vec<Residuals> = columns.next().unwrap_or_default().iter().map(|(residuals, _)| residuals.clone()).collect();
+        let own = columns.map(|shifted| {
+            let of_run = |((a, step), b): (&(Residuals, f64), &Residuals)| a.iter().zip(b).map(|(a, b)| (a - b) / step).collect();
             shifted.iter().zip(&plain).map(of_run).collect()
         });
         let derivatives = known.iter().cloned().chain(own).collect();
@@ -576,11 +583,17 @@ impl<'a> Estimator<'a> {
                 moved.base[kind] += by;
                 self.predict(model, run, &moved)
             };
-            let derivative = |kind: usize, half: f64| -> Result<Vec<f64>, DiagnoseError> {
-                let (before, after) = (at(kind, -half)?, at(kind, half)?);
-                Ok(after.iter().zip(&*before).map(|(b, a)| (b - a) / (2.0 * half)).collect())
-            };
             let now = self.predict(model, run, nuisance)?;
+            // One-sided where a model cannot be simulated on the other side.
+            let derivative = |kind: usize, half: f64| -> Result<Vec<f64>, DiagnoseError> {
+                let (before, after, step) = match (at(kind, -half), at(kind, half)) {
+                    (Ok(before), Ok(after)) => (before, after, 2.0 * half),
+                    (Err(_), Ok(after)) => (now.clone(), after, half),
+                    (Ok(before), Err(_)) => (before, now.clone(), half),
+                    (Err(error), Err(_)) => return Err(error),
+                };
+                Ok(after.iter().zip(&*before).map(|(b, a)| (b - a) / step).collect())
+            };
             let has_clock = [Spread::CLOCK, Spread::RATE].into_iter().any(|kind| plant.has_fault(run, kind));
             let rate = if has_clock { derivative(Spread::CLOCK, HALF_STEP)? } else { vec![0.0; now.len()] };
             let by_gain = derivative(Spread::GAIN, HALF_GAIN)?;

@@ -721,7 +721,13 @@ impl Search<'_> {
                 break;
             };
             // The discretisation and the laws are refined before another cause could take their errors.
-            let settled = self.settle(worthy)?;
+            let before = self.estimator.state();
+            let Ok(settled) = self.settle(worthy) else {
+                // A cause with which some run cannot be simulated is none, and those behind it explain less.
+                self.estimator.restore(before);
+                first.get_or_insert(trials);
+                break;
+            };
             best = self.resolve(settled, Convergence::Rank);
             for index in 0..best.model().terms.len() {
                 best = self.with_its_law(best, index);

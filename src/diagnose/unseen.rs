@@ -28,10 +28,11 @@ impl Unseen {
         if search.split.judge.is_empty() { JudgedBy::CrossValidation } else { JudgedBy::JudgeRuns }
     }
 
-    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be worth it.
+    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be worth it. A run that cannot be simulated with what was
+    /// fitted to others is judged by the nominal model: there the causes are worth nothing.
     ///
     /// # Errors
-    /// [`DiagnoseError`] if the model cannot be simulated.
+    /// [`DiagnoseError`] if the nominal model cannot be simulated.
     pub(super) fn of(search: &Search, scored: &Scored, needs: &[&[usize]]) -> Result<Self, DiagnoseError> {
         let (mut runs, mut models) = (Vec::new(), Vec::new());
         for run in &search.split.judge {
@@ -44,8 +45,11 @@ impl Unseen {
             runs.extend(left_out);
         }
         let judged = |(run, model): (&usize, &Model)| {
-            let chi2 = sum_of_squares(&search.estimator.residuals(model, *run)?);
-            Ok((search.estimator.plain_residuals_of(model, *run)?, chi2))
+            let of = |model: &Model| {
+                let chi2 = sum_of_squares(&search.estimator.residuals(model, *run)?);
+                Ok((search.estimator.plain_residuals_of(model, *run)?, chi2))
+            };
+            of(model).or_else(|_: DiagnoseError| of(&Model { terms: Vec::new(), ..model.clone() }))
         };
         let judged: Vec<(Residuals, f64)> = runs.par_iter().zip(&models).map(judged).collect::<Result<_, DiagnoseError>>()?;
         let (plain, chi2): (Vec<_>, Vec<f64>) = judged.into_iter().unzip();
