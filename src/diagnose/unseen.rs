@@ -89,8 +89,9 @@ mod tests {
     use crate::diagnose::search::Search;
     use crate::diagnose::split::Split;
 
-    /// y = x + noise of 1, −1, ... in each run; the mean of the runs differs.
+    /// y = x + noise of 1, −1, ... in each run; the mean of the runs differs. The first run cannot be simulated beyond an `edge`.
     struct Means {
+        edge: f64,
         signals: Vec<Signal>,
         candidates: Vec<Candidate>,
     }
@@ -113,7 +114,11 @@ mod tests {
         }
 
         fn predict(&self, model: &Model, run: usize, _: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
-            Ok(vec![model.terms.iter().map(|term| term.x[0]).sum(); self.signals[run].values.len()])
+            let x: f64 = model.terms.iter().map(|term| term.x[0]).sum();
+            if run == 0 && x > self.edge {
+                return Err("beyond the edge".into());
+            }
+            Ok(vec![x; self.signals[run].values.len()])
         }
     }
 
@@ -139,7 +144,7 @@ mod tests {
             fixed: Vec::new(),
             starts: vec![vec![1.0]],
         };
-        Means { signals: means.iter().map(signal).collect(), candidates: vec![candidate] }
+        Means { edge: f64::INFINITY, signals: means.iter().map(signal).collect(), candidates: vec![candidate] }
     }
 
     fn search<'a>(plant: &'a Means, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
@@ -163,6 +168,18 @@ mod tests {
         // A fold without which the cause is not worth it is judged without the cause.
         let unseen = Unseen::of(&search, &with, &[&[2]]).unwrap();
         assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_run_beyond_the_edge_is_judged_by_the_nominal_model_and_a_fit_from_the_edge_goes_back() {
+        let plant = Means { edge: 6.5, ..plant(&[3.0, 6.0, 9.0]) };
+        let search = search(&plant, Split { fit: vec![0, 1, 2], select: vec![], judge: vec![] }, &|_| {});
+        let start = Model::new(vec![Term { candidate: 0, x: vec![6.5] }], 1.0, false);
+        let with = search.fitted(&start).unwrap();
+        assert!((with.model().terms[0].x[0] - 6.0).abs() < 1e-6, "{:?}", with.model());
+        // The other runs say 7.5, with which the first one cannot be simulated.
+        let first = &Unseen::of(&search, &with, &[&[]]).unwrap().plain[0];
+        assert!((first.iter().sum::<f64>() / 4.0 - 3.0).abs() < 1e-9, "{first:?}");
     }
 
     #[test]
