@@ -155,7 +155,8 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
             .filter(|(removed, trial)| {
                 let other = &trial.scored;
                 // A law with a further parameter gives way to another cause that does without one and leaves hardly more.
-                let has_further = best.model().terms.iter().any(|t| t.candidate == *removed && search.candidate(t).is_variant);
+                let has_further = best.model().terms.iter().any(|t| t.candidate == *removed && search.candidate(t).is_variant)
+                    && search.id(trial.candidate) != search.id(*removed);
                 let simpler = other.freedom() < best.freedom()
                     && (search.is_tied(&best, other) || (has_further && !search.is_worth(&best, other)));
                 // Of tied causes the likelier one leads; more parameters have to be worth it.
