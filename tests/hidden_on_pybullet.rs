@@ -2,8 +2,6 @@
 //!
 //! Nothing and a weak actuator by default, `SFERS_LONG=1` runs all five. Needs a Python with pybullet and numpy (`common/tools.rs`).
 
-mod common;
-
 #[path = "hidden/generator.rs"]
 mod generator;
 #[path = "hidden/ground.rs"]
@@ -12,8 +10,10 @@ mod ground;
 mod judge;
 #[path = "hidden/pybullet.rs"]
 mod pybullet;
+#[allow(dead_code)] // Chromium
+#[path = "common/tools.rs"]
+mod tools;
 
-use common::tools;
 use ground::{Floor, hide, trace, write};
 use judge::{diagnosed, is_right, long, names};
 use sfers::diagnose::diagnosis::Verdict;
