@@ -103,6 +103,7 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     causes.best = search.backward(best)?;
     let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
     if ids(causes.best.model()) != ids(&before) {
+        // None for a model at the edge of what can be simulated, as in `select`.
         causes.replaced = search.replacements(&causes.best, 4).unwrap_or_default();
     }
     causes.coarse_total = causes.best.total();

@@ -723,7 +723,7 @@ impl Search<'_> {
             // The discretisation and the laws are refined before another cause could take their errors.
             let before = self.estimator.state();
             let Ok(settled) = self.settle(worthy) else {
-                // A cause with which some run cannot be simulated is none, and those behind it explain less.
+                // A cause with which some run cannot be simulated is none, and the selection ends with those before it.
                 self.estimator.restore(before);
                 first.get_or_insert(trials);
                 break;
