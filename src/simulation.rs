@@ -158,6 +158,8 @@ impl Simulation {
             start,
             friction,
             numerical_damping,
+            velocity_limit: None,
+            joint_angles: Vec::new(),
             effects: Vec::new(),
             config: Config::default(),
         })

@@ -21,7 +21,7 @@ extern "C" {
 /* ---- identity ------------------------------------------------------------------------------------------------------ */
 
 /* Raised whenever a signature, a structure or a constant of this header changes. */
-#define BS_ABI_VERSION 3
+#define BS_ABI_VERSION 4
 
 #define BS_OK 0
 #define BS_ERROR_ARGUMENT 1  /* a null pointer, a wrong length, an index out of range, a value that Bullet would assert on */
@@ -158,6 +158,9 @@ int32_t bs_link_states(bs_world *world, int32_t body, double *states, int32_t le
 /* The velocity that Bullet clamps every generalised velocity of `body` to (btMultiBody::getMaxCoordinateVelocity), and the largest
  * magnitude of a generalised velocity now (cm/s or rad/s). Equal values mean that the clamp has bitten. */
 int32_t bs_velocity_clamp(const bs_world *world, int32_t body, double *limit, double *largest);
+
+/* Sets that velocity (btMultiBody::setMaxCoordinateVelocity; 100 in a new body). limit: positive. */
+int32_t bs_velocity_clamp_set(bs_world *world, int32_t body, double limit);
 
 /* ---- contacts ------------------------------------------------------------------------------------------------------ */
 

@@ -402,4 +402,12 @@ int32_t bs_velocity_clamp(const bs_world *world, int32_t body, double *limit, do
   });
 }
 
+int32_t bs_velocity_clamp_set(bs_world *world, int32_t body, double limit) {
+  return bs::guarded(nullptr, 0, [&] {
+    require(world != nullptr, "null pointer");
+    require_positive(limit, "a velocity limit must be positive and finite");
+    world->multibody(body).setMaxCoordinateVelocity(limit);
+  });
+}
+
 }  // extern "C"

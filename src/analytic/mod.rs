@@ -77,6 +77,7 @@ mod tests {
             damping: Damping::Eta(damping),
             collision_thickness: 0.1,
             friction: Friction { ground: 1.0, low: 1.0, high: 1.0, film: Film::None, film_fraction: 0.5 },
+            masses: Vec::new(),
             bodies: None,
             extensions: Extensions::default(),
         }

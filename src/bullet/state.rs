@@ -3,7 +3,7 @@
 use bullet_sys as sys;
 
 use super::body::{BaseState, BodyId, Contact, LinkState, VelocityClamp, Wrench};
-use super::check::{finite, index, not_negative};
+use super::check::{finite, index, not_negative, positive};
 use super::raw::{Message, outcome};
 use super::{BulletError, World};
 
@@ -148,6 +148,18 @@ impl World {
         let code = unsafe { sys::bs_velocity_clamp(self.pointer(), body.index, &mut clamp.limit, &mut clamp.largest) };
         outcome(code, || "velocity clamp".into())?;
         Ok(clamp)
+    }
+
+    /// Sets the velocity that Bullet clamps every generalised velocity of `body` to (cm/s or rad/s); that of a new body is 100.
+    ///
+    /// # Errors
+    /// [`BulletError::ForeignBody`], [`BulletError::Value`] unless the limit is positive and finite.
+    pub fn set_velocity_clamp(&mut self, body: BodyId, limit: f64) -> Result<(), BulletError> {
+        self.links_of(body)?;
+        positive("a velocity limit (cm/s or rad/s)", &[limit])?;
+        // SAFETY: the body's index is valid in this world (links_of).
+        let code = unsafe { sys::bs_velocity_clamp_set(self.pointer(), body.index, limit) };
+        outcome(code, || "velocity clamp".into())
     }
 
     /// Reads the contact points of the last step into `contacts`, which is cleared first, in Bullet's order.

@@ -1,4 +1,6 @@
-//! `sfers run`: simulate one experiment and print its measures.
+//! `sfers run`: simulate one experiment, or its ensemble, and print its measures.
+
+mod ensemble;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -35,6 +37,7 @@ pub struct Args {
     robot: Option<PathBuf>,
     /// Save the recording: FILE.npz (the reference's keys, CGS; nodes_velocity holds the nodes' own velocities, which dataPositionVelocities
     /// does not on Bullet) or FILE.csv (units in the header, the nodes' own velocities); `-` is CSV on standard output.
+    /// Of an experiment with [ensemble]: FILE.csv, with a row of measures for each member.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Save the final state, from which another run can continue.
@@ -67,7 +70,7 @@ pub fn source(path: &Path, settings: &[String]) -> Result<Source, Failure> {
 }
 
 /// The experiment of the arguments, with the engine of `--engine` and the bodies of `--robot`.
-fn experiment_of(args: &Args) -> Result<Experiment, Failure> {
+fn experiment_of(args: &Args) -> Result<(Source, Experiment), Failure> {
     let mut source = source(&args.experiment, &args.settings)?;
     if let Some(engine) = &args.engine {
         let key = "simulation.engine";
@@ -80,18 +83,25 @@ fn experiment_of(args: &Args) -> Result<Experiment, Failure> {
         }
         source.push(Setting { key: key.into(), value: engine.clone(), place: format!("--engine {engine}") });
     }
-    let Some(path) = &args.robot else { return Ok(experiment::experiment(&source)?) };
+    let Some(path) = &args.robot else {
+        let experiment = experiment::experiment(&source)?;
+        return Ok((source, experiment));
+    };
     if path == Path::new("-") && args.experiment == path.as_path() {
         return Err(Failure::Usage("the experiment and the robot cannot both be standard input".into()));
     }
     let bad = |reason: String| Failure::Data(format!("{}: {reason}", path.display()));
     let text = read(path).map_err(|error| bad(error.to_string()))?;
     let bodies = export::bodies(&text, &experiment::experiment(&source)?.robot).map_err(|error| bad(error.to_string()))?;
-    Ok(experiment::with_bodies(&source, &bodies)?)
+    let experiment = experiment::with_bodies(&source, &bodies)?;
+    Ok((source, experiment))
 }
 
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
-    let experiment = experiment_of(args)?;
+    let (source, experiment) = experiment_of(args)?;
+    if experiment.config.ensemble.is_some() {
+        return ensemble::run(args, &source, options);
+    }
     let output = args.out.as_deref().map(Output::open).transpose()?;
     let state_file = args.save_state.as_deref().map(pending).transpose()?;
     let mut engine = experiment.engine()?;

@@ -44,6 +44,9 @@ pub enum CrosscheckError {
     /// The authors' package has no class for this experiment.
     #[error("the authors' package has no class for this experiment: {0}")]
     NoClass(String),
+    /// The experiment has what the reference has not.
+    #[error("the reference has no {0}; leave it out for a comparison")]
+    Beyond(&'static str),
     /// A temporary file could not be made.
     #[error("a temporary file could not be made: {0}")]
     Temporary(#[from] std::io::Error),
@@ -63,8 +66,17 @@ pub struct Versions {
 /// Runs an experiment on PyBullet through its public API.
 ///
 /// # Errors
-/// [`CrosscheckError`] if Python, PyBullet or numpy is missing, or the script fails.
+/// [`CrosscheckError`] if Python, PyBullet or numpy is missing, the script fails, or the experiment is beyond the reference.
 pub fn run_pybullet(experiment: &Experiment, python: &Path) -> Result<(Recording, Versions), CrosscheckError> {
+    for (what, has) in [
+        ("effects", !experiment.effects.is_empty()),
+        ("payloads", !experiment.robot.masses.is_empty()),
+        ("joint angles to start from", !experiment.joint_angles.is_empty()),
+    ] {
+        if has {
+            return Err(CrosscheckError::Beyond(what));
+        }
+    }
     run_script(REFERENCE_SCRIPT, experiment.spec(), python)
 }
 

@@ -4,7 +4,8 @@ This is the far side of `sfers crosscheck`. It is written from the published rec
 drive and torque law are computed here once more, so a mistake on either side shows. CGS units (cm, g, s, dyn, V) throughout.
 
 Input: keys `material`, `actuators`, `motors_per_actuator`, `mount` (ground | clamped | free), `damping_eta` or `damping_time` (the
-other null), `collision_thickness`, `positive_gain`, `friction`, `drive`, `time_step`, `steps`, `record_every_steps`, `out`.
+other null), `collision_thickness`, `positive_gain`, `friction`, `drive`, `time_step`, `steps`, `record_every_steps`, `out`; `velocity_limit` (cm/s
+of the base, rad/s of base and joints) where it is not Bullet's 100.
 Output: the recording in `out`, and on standard output one line with the versions used.
 
 Exit codes: 0 done; 3 PyBullet or numpy cannot be imported; 4 PyBullet refused the robot, or the state stopped being finite.
@@ -222,6 +223,8 @@ def build(spec, mass):
         pybullet.createConstraint(robot, -1, -1, -1, pybullet.JOINT_FIXED, [0, 0, 0], [0, 0, 0], [0, 0, 0])
     else:
         pybullet.changeDynamics(robot, -1, **undamped)
+    if "velocity_limit" in spec:
+        pybullet.changeDynamics(robot, -1, maxJointVelocity=spec["velocity_limit"])
     return robot
 
 

@@ -2,6 +2,7 @@
 
 use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, PlanarBase};
 use crate::effects::SignalChain;
+use crate::model::Robot;
 
 /// Any engine behind a [`SignalChain`].
 pub struct AffectedEngine {
@@ -79,6 +80,10 @@ impl Engine for AffectedEngine {
 
     fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError> {
         self.engine.contacts(contacts)
+    }
+
+    fn set_joint_angles(&mut self, robot: &Robot, angles: &[f64]) -> Result<(), EngineError> {
+        self.engine.set_joint_angles(robot, angles)
     }
 
     fn advance(&mut self) -> Result<(), EngineError> {

@@ -24,7 +24,7 @@ use self::attachment::Attachments;
 use self::geometry::{add, base_pitch, boxes, cross, pitch, rotation};
 use self::joint_extensions::JointExtensions;
 use self::sliding::Sliding;
-use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase};
+use super::{ClampHits, Contact, Engine, EngineError, JointState, PlanarBase, Posed};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
 use crate::bullet::{self, BaseState, BodyId, Ground, LinkState, Snapshot, SolverSettings, World, Wrench};
@@ -149,6 +149,14 @@ impl BulletEngine {
             com_to_box: if com_to_box.iter().any(|&by| by != 0.0) { com_to_box } else { Vec::new() },
             clamp_hits: None,
         })
+    }
+
+    /// Sets Bullet's limit on every velocity of the robot (cm/s of the base, rad/s of base and joints), 100 in the reference.
+    ///
+    /// # Errors
+    /// [`EngineError::Bullet`] unless it is positive and finite.
+    pub fn set_velocity_limit(&mut self, limit: f64) -> Result<(), EngineError> {
+        Ok(self.world.set_velocity_clamp(self.body, limit)?)
     }
 
     /// The world and the robot's body in it, for looking at contacts and links.
@@ -379,6 +387,14 @@ impl Engine for BulletEngine {
             }
         }));
         Ok(())
+    }
+
+    fn set_joint_angles(&mut self, robot: &Robot, angles: &[f64]) -> Result<(), EngineError> {
+        let posed = Posed::new(robot, angles)?;
+        self.world.set_joint_states(self.body, angles, &vec![0.0; angles.len()])?;
+        let mut base = self.world.base_state(self.body)?;
+        base.position[2] += posed.lift;
+        Ok(self.world.set_base_state(self.body, &base)?)
     }
 
     fn advance(&mut self) -> Result<(), EngineError> {

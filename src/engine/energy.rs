@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::{Contact, EnergyTerms, Engine, EngineError, JointState};
 use crate::actuator::PiezoJoint;
-use crate::model::{Robot, box_inertia};
+use crate::model::{RigidBody, Robot, Segment};
 
 /// Steps between audit samples of the state functions, of an explicit engine and of one that works at the middle of steps.
 /// Work is summed in every step.
@@ -97,6 +97,8 @@ struct Body {
     mass: f64,
     /// About y through the centre of mass (g·cm²).
     inertia: f64,
+    /// From the middle of its length to the centre of mass (cm).
+    off_middle: f64,
 }
 
 /// One body's motion in the plane.
@@ -136,12 +138,13 @@ pub struct EnergyAudit {
 impl EnergyAudit {
     /// The audit of a robot that is stepped by `time_step` (s).
     pub fn new(robot: &Robot, time_step: f64) -> Self {
-        let thickness = robot.collision_thickness;
-        let bodies: Vec<Body> = robot
-            .segments()
-            .iter()
-            .map(|s| Body { length: s.length, mass: s.mass, inertia: box_inertia(s.mass, s.length, thickness) })
-            .collect();
+        let of_segment = |(segment, body): (Segment, RigidBody)| Body {
+            length: segment.length,
+            mass: body.mass,
+            inertia: body.inertia,
+            off_middle: (body.middle - 0.5) * segment.length,
+        };
+        let bodies: Vec<Body> = robot.segments().into_iter().zip(robot.rigid_bodies()).map(of_segment).collect();
         let count = bodies.len();
         Self {
             bodies,
@@ -309,7 +312,8 @@ impl EnergyAudit {
             let along = |from: [f64; 2], by: f64| [from[0] + by * cos, from[1] - by * sin];
             let turned = |from: [f64; 2], by: f64| [from[0] - by * sin * rate, from[1] - by * cos * rate];
             let (centre, velocity) = if i == 0 { (end, end_velocity) } else { (along(end, half), turned(end_velocity, half)) };
-            self.motions[i] = Motion { centre, velocity, rate };
+            self.motions[i] =
+                Motion { centre: along(centre, body.off_middle), velocity: turned(velocity, body.off_middle), rate };
             end = along(centre, half);
             end_velocity = turned(velocity, half);
         }

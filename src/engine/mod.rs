@@ -18,7 +18,7 @@ pub use planar::{FrictionModel, PlanarEngine};
 
 use thiserror::Error;
 
-use crate::model::ModelError;
+use crate::model::{ModelError, Mount, Robot};
 
 /// Bullet's limit on the product of two friction coefficients, which the planar engine keeps for equal friction.
 pub(crate) const LARGEST_FRICTION: f64 = 10.0;
@@ -211,6 +211,46 @@ pub struct EnergyTerms {
     pub numerical_loss: f64,
 }
 
+/// A robot at rest with given joint angles, level at its left end, which lies where that of the flat robot does but for the lift.
+struct Posed {
+    /// Direction of every body (rad, anticlockwise).
+    directions: Vec<f64>,
+    /// Centre of mass (cm), with the base's centre at the origin before the lift.
+    centre: [f64; 2],
+    /// How far it is lifted so that its lowest point touches the floor (cm); 0 without a floor.
+    lift: f64,
+}
+
+impl Posed {
+    fn new(robot: &Robot, angles: &[f64]) -> Result<Self, EngineError> {
+        EngineError::unless_length("the joints' angles", angles.len(), robot.joints())?;
+        let (segments, bodies) = (robot.segments(), robot.rigid_bodies());
+        let half = 0.5 * robot.collision_thickness;
+        let mut at = [-0.5 * segments[0].length, 0.0];
+        let (mut direction, mut lowest, mut moment, mut mass) = (0.0, 0.0_f64, [0.0; 2], 0.0);
+        let mut directions = Vec::with_capacity(segments.len());
+        for (i, (segment, body)) in segments.iter().zip(&bodies).enumerate() {
+            if i > 0 {
+                direction -= angles[i - 1];
+            }
+            directions.push(direction);
+            let along = [direction.cos() * segment.length, direction.sin() * segment.length];
+            // The lower edges of both faces, below those of the flat robot.
+            let edge = half - half * direction.cos().abs();
+            for end in [at[1], at[1] + along[1]] {
+                lowest = lowest.min(end + edge);
+            }
+            for k in 0..2 {
+                moment[k] += body.mass * (at[k] + body.middle * along[k]);
+                at[k] += along[k];
+            }
+            mass += body.mass;
+        }
+        let lift = if robot.mount == Mount::Ground { -lowest } else { 0.0 };
+        Ok(Self { directions, centre: moment.map(|moment| moment / mass), lift })
+    }
+}
+
 /// A robot that can be stepped.
 pub trait Engine {
     /// Takes the voltages of the coming step (V), one per actuator.
@@ -276,6 +316,13 @@ pub trait Engine {
     /// # Errors
     /// Whatever the engine's library reports.
     fn contacts(&mut self, contacts: &mut Vec<Contact>) -> Result<(), EngineError>;
+
+    /// Puts a `robot` that has not been stepped, as it was built, at rest with these joint angles (rad): level at its left end, and so high that its lowest
+    /// point touches the floor.
+    ///
+    /// # Errors
+    /// [`EngineError::Length`] for another number of angles; whatever the engine's library reports.
+    fn set_joint_angles(&mut self, robot: &Robot, angles: &[f64]) -> Result<(), EngineError>;
 
     /// Applies the torques and steps by the engine's time step.
     ///

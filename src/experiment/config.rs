@@ -8,6 +8,7 @@ use thiserror::Error;
 use toml::Table;
 use toml::de::{DeTable, DeValue};
 
+use super::ensemble::EnsembleConfig;
 use super::presets;
 use crate::effects::Effect;
 use crate::words;
@@ -86,6 +87,9 @@ pub struct Config {
     /// `[[effect]]` tables.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<EffectConfig>,
+    /// `[ensemble]`, which [`ensemble::members`](super::ensemble::members) reads; the experiment itself is its first member.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ensemble: Option<EnsembleConfig>,
 }
 
 impl Config {
@@ -198,6 +202,19 @@ pub struct RobotConfig {
     pub positive_gain: Option<f64>,
     /// Coefficients of friction: [robot.friction].
     pub friction: FrictionConfig,
+    /// Payloads: [[robot.mass]].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mass: Vec<MassConfig>,
+}
+
+/// One `[[robot.mass]]`: a payload fixed to a point of the sheet's centre line.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct MassConfig {
+    /// Distance from the left end along the sheet (mm).
+    pub position_mm: f64,
+    /// Mass (g).
+    pub mass_g: f64,
 }
 
 /// `[robot.friction]`.
@@ -278,6 +295,10 @@ pub struct SimulationConfig {
     pub friction: Option<String>,
     /// Weight of a step's end over that of its start, per time step: damps oscillations between steps; less is more accurate without contact (with engine = "planar") (1/s).
     pub numerical_damping_per_s: Option<f64>,
+    /// Bullet's limit on every velocity: cm/s of the base, rad/s of base and joints (with engine = "bullet").
+    pub velocity_limit: Option<f64>,
+    /// Angle of every joint at the beginning, from the left; the robot begins level at its left end and touches the floor with its lowest point (with start = "flat") (rad).
+    pub joint_angles_rad: Option<Vec<f64>>,
     /// Time step; "auto": adaptive steps, with tolerances refined until the result changes by less than step_error (s).
     pub time_step_s: Option<StepConfig>,
     /// Relative change of the result that a ten times tighter tolerance may make (with time_step_s = "auto").

@@ -3,6 +3,7 @@
 mod adaptive;
 mod auto;
 mod config;
+pub mod ensemble;
 pub mod presets;
 mod range;
 mod resolve;
@@ -13,9 +14,10 @@ mod step_choice;
 
 pub(crate) use config::line_of;
 pub use config::{
-    Config, ConfigError, DriveConfig, EffectConfig, EffectValue, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig,
-    Setting, SimulationConfig, Source, StepConfig,
+    Config, ConfigError, DriveConfig, EffectConfig, EffectValue, FrictionConfig, MassConfig, MaterialConfig, PhaseConfig,
+    RobotConfig, Setting, SimulationConfig, Source, StepConfig,
 };
+pub use ensemble::{EnsembleConfig, PerturbationConfig, Spread};
 pub use range::Bending;
 pub(crate) use range::{step_too_long, unstable};
 #[cfg(test)]
@@ -71,6 +73,10 @@ pub struct Experiment {
     pub friction: FrictionModel,
     /// Numerical damping of the planar engine (1/s), where it is not the engine's own.
     pub numerical_damping: Option<f64>,
+    /// Bullet's limit on velocities (cm/s of the base, rad/s of base and joints), where it is not the reference's.
+    pub velocity_limit: Option<f64>,
+    /// Angles of the joints at the beginning (rad); empty for the flat robot.
+    pub joint_angles: Vec<f64>,
     /// Extensions of the model; those that act on robot and drive are in them already.
     pub effects: Vec<Applied>,
     /// The keys as they were given.
@@ -108,11 +114,17 @@ impl Experiment {
         let mut voltages = vec![0.0; self.robot.actuators];
         self.drive.voltages(0.0, &mut voltages);
         chain.settle(&mut voltages);
-        let engine: Box<dyn Engine> = match self.engine {
+        let mut engine: Box<dyn Engine> = match self.engine {
             #[cfg(not(feature = "bullet"))]
             EngineKind::Bullet => return Err(EngineError::NoBullet),
             #[cfg(feature = "bullet")]
-            EngineKind::Bullet => Box::new(crate::engine::BulletEngine::new(&self.robot, self.time_step)?),
+            EngineKind::Bullet => {
+                let mut engine = crate::engine::BulletEngine::new(&self.robot, self.time_step)?;
+                if let Some(limit) = self.velocity_limit {
+                    engine.set_velocity_limit(limit)?;
+                }
+                Box::new(engine)
+            }
             EngineKind::Planar => {
                 let mut engine = match self.numerical_damping {
                     Some(damping) => PlanarEngine::with_numerical_damping(&self.robot, self.time_step, damping)?,
@@ -125,6 +137,9 @@ impl Experiment {
                 Box::new(engine)
             }
         };
+        if !self.joint_angles.is_empty() {
+            engine.set_joint_angles(&self.robot, &self.joint_angles)?;
+        }
         Ok(if chain.is_empty() { engine } else { Box::new(AffectedEngine::new(engine, chain, self.time_step)) })
     }
 

@@ -52,6 +52,12 @@ impl Experiment {
         if let Some(damping) = self.numerical_damping {
             spec["numerical_damping"] = json!(damping);
         }
+        if let Some(limit) = self.velocity_limit {
+            spec["velocity_limit"] = json!(limit);
+        }
+        if !self.joint_angles.is_empty() {
+            spec["joint_angles"] = json!(self.joint_angles);
+        }
         if self.record_from + 1 != self.record_every {
             spec["record_from_step"] = json!(self.record_from);
         }
@@ -63,6 +69,9 @@ impl Experiment {
                 Value::Object(std::iter::once(id).chain(fields).collect())
             };
             spec["effects"] = self.effects.iter().map(values).collect();
+        }
+        if !self.robot.masses.is_empty() {
+            spec["masses"] = self.robot.masses.iter().map(|m| json!({"mass": m.mass, "position": m.position})).collect();
         }
         if let Some(bodies) = &self.robot.bodies {
             spec["bodies"] = bodies.iter().map(|b| json!({"length": b.length, "mass": b.mass, "friction": b.friction})).collect();

@@ -26,7 +26,7 @@ pub struct SavedState {
 fn robot(experiment: &Experiment) -> Value {
     let mut spec = experiment.spec();
     if let Value::Object(fields) = &mut spec {
-        for key in ["drive", "start", "steps", "record_every_steps", "record_from_step"] {
+        for key in ["drive", "start", "joint_angles", "steps", "record_every_steps", "record_from_step"] {
             fields.remove(key);
         }
         // Limits decide no bits.

@@ -55,7 +55,7 @@ fn indent(i: usize) -> String {
 }
 
 fn open_body(out: &mut String, robot: &Robot, i: usize, body: &Placed) {
-    let Placed { name, segment, frame, centre, size, inertia: [ixx, iyy, izz] } = body;
+    let Placed { name, segment, mass, frame, centre, centre_of_mass, size, inertia: [ixx, iyy, izz] } = body;
     let pad = indent(i);
     let joint = match (i, robot.mount) {
         (0, Mount::Clamped) => String::new(),
@@ -66,7 +66,6 @@ fn open_body(out: &mut String, robot: &Robot, i: usize, body: &Placed) {
     let [x, y, z] = size.map(|edge| 0.5 * edge);
     let _ = writeln!(
         out,
-        "{pad}<body name=\"{name}\" pos=\"{frame} 0 0\">{joint}\n{pad}  <inertial pos=\"{centre} 0 0\" mass=\"{}\" diaginertia=\"{ixx} {iyy} {izz}\"/>\n{pad}  <geom name=\"{name}\" pos=\"{centre} 0 0\" size=\"{x} {y} {z}\" friction=\"{friction} 0.005 0.0001\"/>",
-        segment.mass
+        "{pad}<body name=\"{name}\" pos=\"{frame} 0 0\">{joint}\n{pad}  <inertial pos=\"{centre_of_mass} 0 0\" mass=\"{mass}\" diaginertia=\"{ixx} {iyy} {izz}\"/>\n{pad}  <geom name=\"{name}\" pos=\"{centre} 0 0\" size=\"{x} {y} {z}\" friction=\"{friction} 0.005 0.0001\"/>"
     );
 }

@@ -41,13 +41,14 @@ pub fn urdf(experiment: &Experiment, command: &str) -> String {
 }
 
 fn link(out: &mut String, body: &Placed) {
-    let Placed { name, segment, centre, size: [x, y, z], inertia: [ixx, iyy, izz], .. } = body;
-    let origin = format!("<origin xyz=\"{centre} 0 0\" rpy=\"0 0 0\"/>");
-    let shape = format!("{origin}<geometry><box size=\"{x} {y} {z}\"/></geometry>");
+    let Placed { name, segment, mass, centre, centre_of_mass, size: [x, y, z], inertia: [ixx, iyy, izz], .. } = body;
+    let origin = |x: &f64| format!("<origin xyz=\"{x} 0 0\" rpy=\"0 0 0\"/>");
+    let shape = format!("{}<geometry><box size=\"{x} {y} {z}\"/></geometry>", origin(centre));
     let _ = writeln!(
         out,
-        "  <link name=\"{name}\">\n    <inertial>{origin}<mass value=\"{}\"/>\n      <inertia ixx=\"{ixx}\" iyy=\"{iyy}\" izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>\n    <contact><lateral_friction value=\"{}\"/></contact>\n    <visual>{shape}</visual>\n    <collision>{shape}</collision>\n  </link>",
-        segment.mass, segment.friction
+        "  <link name=\"{name}\">\n    <inertial>{}<mass value=\"{mass}\"/>\n      <inertia ixx=\"{ixx}\" iyy=\"{iyy}\" izz=\"{izz}\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial>\n    <contact><lateral_friction value=\"{}\"/></contact>\n    <visual>{shape}</visual>\n    <collision>{shape}</collision>\n  </link>",
+        origin(centre_of_mass),
+        segment.friction
     );
 }
 

@@ -190,7 +190,8 @@ fn body(link: &Link, base: bool, robot: &Robot) -> Result<f64, UrdfError> {
     for (name, pose) in [("inertial", &link.inertial.origin), ("collision", &collision.origin)] {
         let [x, y, z] = pose.xyz.0;
         if pose.rpy.0 != [0.0; 3] || y != 0.0 || z != 0.0 || !(same(x, centre) || x == centre) {
-            return bad(format!("the origin of its <{name}> must be {centre} 0 0 without turning"));
+            let payload = if name == "inertial" { "; write payloads as [[robot.mass]] of the experiment" } else { "" };
+            return bad(format!("the origin of its <{name}> must be {centre} 0 0 without turning{payload}"));
         }
     }
     let i = &link.inertial.inertia;

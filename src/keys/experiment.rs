@@ -11,7 +11,7 @@ use crate::recording::definitions;
 pub(super) static FILE: File = File {
     name: "experiment",
     about: "One robot, its drive and its simulation. `sfers run`, `animate`, `urdf`, `mjcf` and `crosscheck` read it.",
-    sections: &[MATERIAL, ROBOT, FRICTION, DRIVE, PHASES, SIMULATION, EFFECT],
+    sections: &[MATERIAL, ROBOT, FRICTION, MASS, DRIVE, PHASES, SIMULATION, EFFECT, ENSEMBLE, PERTURBATION],
 };
 
 pub(super) const MATERIAL: Section = Section {
@@ -109,6 +109,17 @@ pub(super) const ROBOT: Section = Section {
             "factor on positive voltages before the torque law; 1.733 for the voltages applied to the published robot",
         ),
         key("friction", Other("a table"), Else("see below"), "coefficients of friction: [robot.friction]"),
+        key("mass", Other("a list of tables"), Else("no payload"), "payloads: [[robot.mass]]"),
+    ],
+};
+
+pub(super) const MASS: Section = Section {
+    name: "robot.mass",
+    heading: "[[robot.mass]]",
+    about: "Zero or more payloads, each a mass at a point of the sheet's centre line.",
+    keys: &[
+        key("position_mm", Number(NotNegative), Needed, "distance from the left end along the sheet"),
+        key("mass_g", Number(NotNegative), Needed, "mass"),
     ],
 };
 
@@ -218,6 +229,8 @@ pub(super) const SIMULATION: Section = Section {
         key("start", Word(&["flat", "settled"]), Is("\"flat\""), "flat and at rest; or in equilibrium with gravity, floor and first voltages (planar engine)"),
         key("friction", Word(&["coulomb", "convex"]), Is("\"coulomb\""), "law of friction: coulomb is solved in every step; convex, a relaxation, lifts sliding contacts by friction times speed times time step").with("engine = \"planar\""),
         key("numerical_damping_per_s", Number(NotNegative), Else("50"), "weight of a step's end over that of its start, per time step: damps oscillations between steps; less is more accurate without contact").with("engine = \"planar\""),
+        key("velocity_limit", Number(Positive), Is("100.0"), "Bullet's limit on every velocity: cm/s of the base, rad/s of base and joints").with("engine = \"bullet\""),
+        key("joint_angles_rad", Numbers, Else("0 for every joint"), "angle of every joint at the beginning, from the left; the robot begins level at its left end and touches the floor with its lowest point; with start = \"flat\""),
         key("time_step_s", Other("a number from 1e-12 to 1000, or \"auto\" on the planar engine"), Needed, "time step; \"auto\": adaptive steps, with tolerances refined until the result changes by less than step_error"),
         key("step_error", Number(Inside(0.0, 1.0)), Is("0.001"), "relative change of the result that a ten times tighter tolerance may make").with("time_step_s = \"auto\""),
         key("step_measure", Name("measure", definitions::names), Else("the path of all nodes"), "name of the measure that sets the tolerance").with("time_step_s = \"auto\""),
@@ -235,4 +248,31 @@ pub(super) const EFFECT: Section = Section {
     heading: "[[effect]]",
     about: "Zero or more extensions of the model, each with its parameters as further keys: `sfers effects` lists them with units, ranges and defaults; numbered ones, as moment_1_mn_m to moment_5_mn_m, may be given as a list under the key without the number, moment_mn_m = [0.1, 0.2, 0.2, 0.1, 0]. At most 100.",
     keys: &[key("id", Name("effect", effects), Needed, "name of the effect")],
+};
+
+pub(super) const ENSEMBLE: Section = Section {
+    name: "ensemble",
+    heading: "[ensemble]",
+    about: "The experiment run many times with small perturbations. `sfers run` prints mean, standard deviation and quantiles of every measure, a sweep has a column for each; other commands take the experiment as it is written.",
+    keys: &[
+        key("members", Whole(Between(2.0, 10_000.0)), Needed, "number of runs; the first is the experiment as it is written"),
+        key("seed", Other("a whole number from 0 on"), Is("0"), "seed of the perturbations"),
+        key("vary", Other("a table"), Needed, "perturbed keys: [ensemble.vary]"),
+    ],
+};
+
+pub(super) const PERTURBATION: Section = Section {
+    name: "ensemble.vary.KEY",
+    heading: "\"KEY\" = { ... } of [ensemble.vary]",
+    about: "How one key of the experiment, with dots and in quotes as \"robot.friction.low\", differs from member to member: exactly one of these. A list of numbers is perturbed number by number.",
+    keys: &[
+        key(
+            "sd",
+            Number(NotNegative),
+            Else("relative or values"),
+            "standard deviation of a normal distribution, in the unit of the key",
+        ),
+        key("relative", Number(NotNegative), Else("sd or values"), "standard deviation as a share of the value"),
+        key("values", Other("a list of values"), Else("sd or relative"), "values that the members take by turns"),
+    ],
 };

@@ -115,6 +115,17 @@ pub fn unit(name: &str) -> &'static str {
     crate::words::split_unit(name).map_or("", |(_, unit)| unit)
 }
 
+/// The default of a key of an experiment file, with its table before it, as TOML; of a material the one of either preset. `None` if there is none.
+pub(crate) fn default_of(dotted: &str, is_parameter_4: bool) -> Option<&'static str> {
+    let (table, name) = dotted.rsplit_once('.')?;
+    let sections = experiment::FILE.sections.iter().filter(|section| section.name == table);
+    match sections.flat_map(|section| section.keys).find(|key| key.name == name)?.default {
+        Default::Is(text) => Some(text),
+        Default::OfPreset(two, four) => Some(if is_parameter_4 { four } else { two }),
+        Default::Needed | Default::Else(_) => None,
+    }
+}
+
 impl Section {
     /// The name of a key with its table's.
     pub fn dotted(&self, key: &Key) -> String {

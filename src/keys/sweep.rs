@@ -1,6 +1,6 @@
 //! Keys of sweep files.
 
-use super::Default::Needed;
+use super::Default::{Else, Needed};
 use super::Value::{Names, Number, Other, Text, Whole};
 use super::{File, Range, Section, key};
 use crate::recording::definitions;
@@ -19,6 +19,12 @@ pub(super) const TOP: Section = Section {
         key("experiment", Text, Needed, "the experiment file, relative to the sweep file, or \"preset:NAME\""),
         key("measures", Names("measure", definitions::names), Needed, "names of the measures, one column each"),
         key("vary", Other("a table"), Needed, "varied keys: [vary]"),
+        key(
+            "ensemble",
+            Other("a table"),
+            Else("the experiment's"),
+            "perturbations of every point: [ensemble] as in an experiment file",
+        ),
     ],
 };
 

@@ -7,8 +7,8 @@ use super::{Default, Key, Range, Section, Value, dataset, experiment, markdown, 
 use crate::diagnose::dataset::Description;
 use crate::drive::gait::GAITS;
 use crate::experiment::{
-    Config, ConfigError, DriveConfig, EffectConfig, Experiment, FrictionConfig, MaterialConfig, PhaseConfig, RobotConfig,
-    SimulationConfig, Source,
+    Config, ConfigError, DriveConfig, EffectConfig, EnsembleConfig, Experiment, FrictionConfig, MassConfig, MaterialConfig,
+    PerturbationConfig, PhaseConfig, RobotConfig, SimulationConfig, Source,
 };
 use crate::sweep::Sweep;
 
@@ -26,10 +26,16 @@ fn listed(section: &Section) -> BTreeSet<String> {
 
 #[test]
 fn the_tables_have_the_keys_that_the_parser_accepts_and_no_others() {
-    assert_eq!(accepted::<Config>(""), ["material", "robot", "drive", "simulation", "effect"].map(String::from).into());
+    assert_eq!(
+        accepted::<Config>(""),
+        ["material", "robot", "drive", "simulation", "effect", "ensemble"].map(String::from).into()
+    );
     assert_eq!(listed(&experiment::MATERIAL), accepted::<MaterialConfig>(""));
     assert_eq!(listed(&experiment::ROBOT), accepted::<RobotConfig>(""));
     assert_eq!(listed(&experiment::FRICTION), accepted::<FrictionConfig>(""));
+    assert_eq!(listed(&experiment::MASS), accepted::<MassConfig>("position_mm = 1\nmass_g = 1"));
+    assert_eq!(listed(&experiment::ENSEMBLE), accepted::<EnsembleConfig>("members = 2\nvary = {}"));
+    assert_eq!(listed(&experiment::PERTURBATION), accepted::<PerturbationConfig>(""));
     assert_eq!(listed(&experiment::DRIVE), accepted::<DriveConfig>(""));
     assert_eq!(listed(&experiment::PHASES), accepted::<PhaseConfig>(""));
     assert_eq!(listed(&experiment::SIMULATION), accepted::<SimulationConfig>(""));
@@ -310,8 +316,9 @@ fn what_a_key_goes_with_is_what_the_program_lets_it_go_with() {
                 assert_eq!(takes, stated.iter().copied().collect::<BTreeSet<_>>().into_iter().collect::<Vec<_>>(), "{name}");
             }
         } else if name.starts_with("simulation.") {
-            let bullet = &bases()[0].1;
-            let mut source = Source::from_text("base", bullet.as_str());
+            let (bullet, planar) = (bases().remove(0).1, bases().pop().unwrap().1);
+            let other = if key.with.contains("bullet") { planar } else { bullet };
+            let mut source = Source::from_text("base", other);
             source.set(&format!("{name}={value}")).unwrap();
             let refused = crate::experiment::experiment(&source).err().map_or_else(String::new, |error| error.to_string());
             assert_eq!(refused.contains("belongs to"), !key.with.is_empty(), "{name}: {refused}");

@@ -1,7 +1,7 @@
 //! Standard robots and the changes to them: the defaults of experiment files.
 
 use super::units::cm_from_mm;
-use super::{Damping, Extensions, Film, Friction, Material, Mount, Robot};
+use super::{Damping, Extensions, Film, Friction, Material, Mount, PointMass, Robot};
 
 impl Robot {
     /// One clamped actuator of three joints.
@@ -28,6 +28,7 @@ impl Robot {
             damping: Damping::Eta(0.045),
             collision_thickness: 0.1,
             friction: Friction { ground: 1.0, low: 0.2, high: 4.0, film: Film::BothEnds, film_fraction: 0.5 },
+            masses: Vec::new(),
             bodies: None,
             extensions: Extensions::default(),
         }
@@ -100,6 +101,13 @@ impl Robot {
     #[must_use]
     pub fn with_ground_friction(mut self, ground: f64) -> Self {
         self.friction.ground = ground;
+        self
+    }
+
+    /// With a payload (g) at a distance (mm) from the left end along the sheet.
+    #[must_use]
+    pub fn with_payload(mut self, mass_g: f64, position_mm: f64) -> Self {
+        self.masses.push(PointMass { mass: mass_g, position: cm_from_mm(position_mm) });
         self
     }
 

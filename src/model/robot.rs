@@ -100,6 +100,8 @@ pub struct Robot {
     pub collision_thickness: f64,
     /// Friction coefficients and films.
     pub friction: Friction,
+    /// Payloads.
+    pub masses: Vec<PointMass>,
     /// The N·m + 1 bodies, where they were read from a file instead of following from the fields above.
     pub bodies: Option<Vec<Segment>>,
     /// What it has beyond the plain model.
@@ -201,7 +203,7 @@ impl Robot {
             .collect()
     }
 
-    /// The segments as boxes whose mass is spread evenly, with the point masses fixed to them.
+    /// The segments as boxes whose mass is spread evenly, with payloads and the point masses of extensions fixed to them.
     pub fn rigid_bodies(&self) -> Vec<RigidBody> {
         let segments = self.segments();
         let mut left = 0.0;
@@ -212,7 +214,7 @@ impl Robot {
             let inertia = box_inertia(segment.mass, length, self.collision_thickness);
             let mut body = RigidBody { mass: segment.mass, inertia, middle: 0.5 };
             let here = |point: &&PointMass| point.position >= left && (point.position < left + length || last);
-            for point in self.extensions.point_masses.iter().filter(here) {
+            for point in self.masses.iter().chain(&self.extensions.point_masses).filter(here) {
                 let at = ((point.position - left) / length).min(1.0);
                 let apart = (at - body.middle) * length;
                 let sum = body.mass + point.mass;
@@ -307,6 +309,13 @@ impl Robot {
             self.extensions.clamp_hardening,
             "0 beside a clamp whose turn is a curve",
         )?;
+        let length = self.segments().iter().map(|segment| segment.length).sum::<f64>();
+        for point in &self.masses {
+            let (mass, position) = (point.mass, point.position);
+            ModelError::unless(mass.is_finite() && mass >= 0.0, "robot.mass.mass_g", mass, "zero or more")?;
+            let on_sheet = (0.0..=length * (1.0 + 1e-12)).contains(&position);
+            ModelError::unless(on_sheet, "robot.mass.position_mm", position, "between the ends of the robot")?;
+        }
         let fraction = self.friction.film_fraction;
         ModelError::unless(fraction.is_finite() && fraction >= 0.0, "robot.friction.film_fraction", fraction, "zero or more")?;
         let films = match self.friction.film {

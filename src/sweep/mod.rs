@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use crate::experiment::{self, ConfigError, Experiment, Setting, Source, line_of, presets};
+use crate::experiment::{self, ConfigError, Experiment, Setting, Source, Spread, ensemble, line_of, presets};
 use crate::files;
 use crate::recording::definitions;
 use crate::words;
@@ -62,6 +62,8 @@ pub struct Sweep {
     pub measures: Vec<String>,
     /// The varied keys; the last runs fastest.
     pub axes: Vec<Axis>,
+    /// Whether every point is an ensemble.
+    is_ensemble: bool,
     /// Paths of the files that the experiments refer to, as written there, with a digest of their content.
     files: BTreeMap<String, String>,
 }
@@ -73,6 +75,7 @@ pub(crate) struct File {
     experiment: String,
     measures: Vec<String>,
     vary: Table,
+    ensemble: Option<Table>,
 }
 
 /// `{ from, to, count }`.
@@ -116,10 +119,15 @@ impl Sweep {
                 place: "the engine of sweeps by default".into(),
             });
         }
+        if let Some(ensemble) = file.ensemble {
+            let place = document.place(&["ensemble"]);
+            source.push(Setting { key: "ensemble".into(), value: Value::Table(ensemble).to_string(), place });
+        }
         if axes.is_empty() {
             return Err(document.wrong_size());
         }
-        let mut sweep = Self { source, measures: file.measures, axes, files: BTreeMap::new() };
+        let is_ensemble = source.parse()?.ensemble.is_some();
+        let mut sweep = Self { source, measures: file.measures, axes, is_ensemble, files: BTreeMap::new() };
         for index in 0..sweep.len() {
             for file in experiment::experiment(&sweep.source_of(index)?)?.config.files() {
                 let name = file.display().to_string();
@@ -128,6 +136,7 @@ impl Sweep {
                 }
             }
         }
+        sweep.members(0)?;
         Ok(sweep)
     }
 
@@ -206,6 +215,14 @@ impl Sweep {
         experiment::experiment(&self.source_of(index)?)
     }
 
+    /// The experiments of a point: its ensemble, or one alone.
+    ///
+    /// # Errors
+    /// [`ConfigError`] if the point, or a perturbed one, is not a valid experiment.
+    pub fn members(&self, index: usize) -> Result<Vec<Experiment>, ConfigError> {
+        ensemble::members(&self.source_of(index)?)
+    }
+
     fn source_of(&self, index: usize) -> Result<Source, ConfigError> {
         let mut source = self.source.clone();
         for (axis, value) in self.axes.iter().zip(self.point(index)) {
@@ -219,10 +236,16 @@ impl Sweep {
         Ok(source)
     }
 
+    /// The columns of measures: each measure, or its [`Spread`] over the members of an ensemble, as `mean_speed_mm_s`.
+    pub fn columns(&self) -> Vec<String> {
+        let prefixes: &[&str] = if self.is_ensemble { &Spread::PREFIXES } else { &[""] };
+        self.measures.iter().flat_map(|measure| prefixes.iter().map(move |prefix| format!("{prefix}{measure}"))).collect()
+    }
+
     /// The header of the results.
-    pub fn header(&self) -> Vec<&str> {
-        let keys = self.axes.iter().map(|axis| axis.key.as_str());
-        keys.chain(self.measures.iter().map(String::as_str)).chain(["status"]).collect()
+    pub fn header(&self) -> Vec<String> {
+        let keys = self.axes.iter().map(|axis| axis.key.clone());
+        keys.chain(self.columns()).chain(["status".to_owned()]).collect()
     }
 }
 

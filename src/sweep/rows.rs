@@ -18,7 +18,7 @@ use crate::files::{self, Pending};
 pub struct Row {
     /// Index of the point in the grid.
     pub index: usize,
-    /// The measures, in the sweep's order.
+    /// The measures, in the order of the sweep's [`columns`](Sweep::columns).
     pub measures: Vec<Option<f64>>,
     /// `ok`, or the reason for missing measures.
     pub status: String,
@@ -182,12 +182,13 @@ fn whole_lines(bytes: &[u8]) -> &[u8] {
 
 fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row>, RowError> {
     let foreign = |line: usize, reason: &str| RowError::Foreign { path: path.into(), reason: format!("line {line}: {reason}") };
+    let columns = sweep.columns().len();
     let mut rows = BTreeMap::new();
     let reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes);
     for (line, record) in reader.into_records().enumerate() {
         let line = line + 1;
         let record = record.map_err(|error| foreign(line, &error.to_string()))?;
-        if record.len() != sweep.measures.len() + 2 {
+        if record.len() != columns + 2 {
             return Err(foreign(line, "does not have the fields of a row of this sweep"));
         }
         let index = record[0].parse().ok().filter(|&index: &usize| index < sweep.len());
@@ -196,7 +197,7 @@ fn parse(path: &Path, bytes: &[u8], sweep: &Sweep) -> Result<BTreeMap<usize, Row
             "" => Ok(None),
             _ => text.parse().map(Some).map_err(|_| foreign(line, &format!("{text:?} is not a number"))),
         };
-        let measures = record.iter().skip(1).take(sweep.measures.len()).map(number).collect::<Result<_, _>>()?;
+        let measures = record.iter().skip(1).take(columns).map(number).collect::<Result<_, _>>()?;
         rows.insert(index, Row { index, measures, status: record[record.len() - 1].to_owned() });
     }
     Ok(rows)

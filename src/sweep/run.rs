@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::{Row, RowError, Rows, Sweep};
-use crate::experiment::{self, Control, Run};
+use crate::experiment::{Spread, ensemble};
 
 /// Counts of a sweep's points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -79,32 +79,31 @@ pub fn run(
     })
 }
 
-/// Runs one point; `None` if it was abandoned.
+/// Runs one point, all members of its ensemble; `None` if it was abandoned.
 ///
 /// # Errors
 /// The path of a file that changed since the sweep was read.
-fn compute(sweep: &Sweep, index: usize, given_up: &impl Fn() -> bool) -> Result<Option<Row>, PathBuf> {
-    let experiment = sweep.experiment(index);
-    if let Some(path) = sweep.changed(experiment.as_ref().ok()) {
+fn compute(sweep: &Sweep, index: usize, given_up: &(impl Fn() -> bool + Sync)) -> Result<Option<Row>, PathBuf> {
+    let members = sweep.members(index);
+    if let Some(path) = sweep.changed(members.as_ref().ok().and_then(|members| members.first())) {
         return Err(path);
     }
-    let run = experiment.map_err(|error| error.to_string()).and_then(|mut experiment| {
-        experiment.record_only_what_measures_need(&sweep.measures);
-        let mut engine = experiment.engine().map_err(|error| error.to_string())?;
-        let observe = |_| if given_up() { Control::Stop } else { Control::Continue };
-        let run = experiment::run(&experiment, engine.as_mut(), observe).map_err(|error| error.to_string())?;
-        Ok((experiment, run))
+    let measures = members.map_err(|error| error.to_string()).and_then(|mut members| {
+        members.iter_mut().for_each(|member| member.record_only_what_measures_need(&sweep.measures));
+        ensemble::run_members(&members, given_up)
     });
-    let none = vec![None; sweep.measures.len()];
-    let (experiment, run) = match run {
-        Ok((_, Run { interrupted: true, .. })) => return Ok(None),
-        Ok(pair) => pair,
-        Err(reason) => return Ok(Some(Row { index, measures: none, status: format!("failed: {reason}") })),
+    let measures = match measures {
+        Ok(None) => return Ok(None),
+        Ok(Some(measures)) => measures,
+        Err(reason) => {
+            let none = vec![None; sweep.columns().len()];
+            return Ok(Some(Row { index, measures: none, status: format!("failed: {reason}") }));
+        }
     };
-    let trouble = run.trouble(&experiment);
-    if let Some(reason) = trouble.first() {
-        return Ok(Some(Row { index, measures: none, status: format!("failed: {reason}") }));
-    }
-    let measures = sweep.measures.iter().map(|name| run.measures.get(name)).collect();
-    Ok(Some(Row { index, measures, status: "ok".into() }))
+    let columns = |name: &String| match (&measures[..], sweep.is_ensemble) {
+        ([alone], false) => vec![alone.get(name)],
+        _ => ensemble::spread(&measures, name)
+            .map_or(vec![None; Spread::PREFIXES.len()], |spread| spread.values().map(Some).to_vec()),
+    };
+    Ok(Some(Row { index, measures: sweep.measures.iter().flat_map(columns).collect(), status: "ok".into() }))
 }

@@ -110,6 +110,12 @@ impl Figure {
         self.add(label, points, mark, Look::Styled)
     }
 
+    /// Adds a band in the colour of the series that is added next: x, lower and upper end.
+    pub fn band(&mut self, ends: impl IntoIterator<Item = (f64, f64, f64)>) -> &mut Self {
+        let points = ends.into_iter().flat_map(|(x, low, high)| [(x, low), (x, high)]);
+        self.add("", points, Mark::Line, Look::Band)
+    }
+
     /// Adds a solid line of a given colour and width (pt).
     pub fn line(&mut self, label: &str, points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f64) -> &mut Self {
         self.add(label, points, Mark::Line, Look::Plain { colour: colour.into(), width })

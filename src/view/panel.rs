@@ -102,20 +102,23 @@ impl Panel {
     pub fn styles(&self, labels: &[String]) -> Vec<Style> {
         let styled = self.series.iter().filter(|s| s.look == Look::Styled).count();
         let sequence = self.ends_are_labelled() || styled > STYLES;
+        let of_styled = |place: usize, series: &Series| {
+            if sequence {
+                return Style::solid(&colour(0.85 * place as f64 / (styled.max(2) - 1) as f64), 1.1);
+            }
+            Style::of(labels.iter().position(|l| *l == series.label).unwrap_or(place), styled > 1)
+        };
         let mut next = 0;
-        let style = |series: &Series| match &series.look {
+        let style = |(index, series): (usize, &Series)| match &series.look {
             Look::Plain { colour, width } => Style::solid(colour, *width),
             Look::Robot { colour } => Style::solid(colour, ROBOT),
+            Look::Band => of_styled(next, self.series[index..].iter().find(|s| s.look == Look::Styled).unwrap_or(series)),
             Look::Styled => {
                 next += 1;
-                let place = next - 1;
-                if sequence {
-                    return Style::solid(&colour(0.85 * place as f64 / (styled.max(2) - 1) as f64), 1.1);
-                }
-                Style::of(labels.iter().position(|l| *l == series.label).unwrap_or(place), styled > 1)
+                of_styled(next - 1, series)
             }
         };
-        self.series.iter().map(style).collect()
+        self.series.iter().enumerate().map(style).collect()
     }
 
     /// Values and texts of the y axis: ticks, names of lanes, or rows of a map.

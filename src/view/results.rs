@@ -179,15 +179,27 @@ impl<'a> Plot<'a> {
             None => {
                 for &m in measures {
                     let label = if measures.len() > 1 { words_of(&table.header[m]) } else { String::new() };
+                    self.add_band(figure, rows, m);
                     figure.series(&label, table.curve(rows, *x, m), Mark::Both);
                 }
             }
             Some(key) => {
                 for value in table.values(key) {
                     let rows: Vec<_> = rows.iter().copied().filter(|r| r[key] == value).collect();
+                    self.add_band(figure, &rows, measures[0]);
                     figure.series(&equals(&table.header[key], &value), table.curve(&rows, *x, measures[0]), Mark::Both);
                 }
             }
+        }
+    }
+}
+
+impl Plot<'_> {
+    /// Adds the band from 5 to 95 % of an ensemble.
+    fn add_band(&self, figure: &mut Figure, rows: &[&csv::StringRecord], measure: usize) {
+        if let Some(ends) = self.table.band(measure) {
+            let [low, high] = ends.map(|column| self.table.curve(rows, self.x, column));
+            figure.band(low.into_iter().zip(high).map(|((x, low), (_, high))| (x, low, high)));
         }
     }
 }

@@ -35,6 +35,8 @@ pub(super) enum Look {
     Plain { colour: String, width: f64 },
     /// A robot: a thick line with its lower face at the points.
     Robot { colour: String },
+    /// A band of the colour of the styled series that follows; its points are pairs, lower and upper end.
+    Band,
 }
 
 #[derive(Debug, Clone)]
@@ -114,6 +116,10 @@ impl Series {
         // z of a recording is the height of the centre line above its height on the flat robot, drawn as the lower face.
         let lift = if matches!(self.look, Look::Robot { .. }) { ROBOT / 2.0 } else { 0.0 };
         let at = |p: &(f64, f64)| (x.at(p.0), y.at(p.1) - lift);
+        if self.look == Look::Band {
+            self.draw_band(out, at, style);
+            return;
+        }
         if self.mark != Mark::Points {
             for part in self.points.split(|p| !shown(*p)).filter(|part| part.len() > 1) {
                 let points: Vec<_> =
@@ -134,6 +140,22 @@ impl Series {
                     style.marker(out, x, y);
                 }
             }
+        }
+    }
+
+    /// Draws a band, interrupted where an end is missing.
+    fn draw_band(&self, out: &mut String, at: impl Fn(&(f64, f64)) -> (f64, f64), style: &Style) {
+        let pairs: Vec<&[(f64, f64)]> = self.points.chunks_exact(2).collect();
+        for part in pairs.split(|pair| !pair.iter().all(|p| shown(*p))).filter(|part| part.len() > 1) {
+            let there = part.iter().map(|pair| at(&pair[0]));
+            let back = part.iter().rev().map(|pair| at(&pair[1]));
+            let points: Vec<_> = there.chain(back).map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
+            let _ = writeln!(
+                out,
+                r#"<polygon points="{}" fill="{}" fill-opacity="0.18" stroke="none"/>"#,
+                points.join(" "),
+                style.colour
+            );
         }
     }
 

@@ -59,6 +59,7 @@ impl Dataset {
                 ..SimulationConfig::default()
             },
             effect: description.effect,
+            ensemble: None,
         };
         check_effects(&nominal.effect)
             .map_err(|(index, reason)| value_error(path, &text, &["effect", &index.to_string()], "effect", reason))?;

@@ -5,8 +5,8 @@ use fearless_simd::dispatch;
 use super::lanes::Lanes;
 use super::law::Ahead;
 use super::quad::Quad;
-use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, PlanarBase, PlanarEngine, landing, place};
-use crate::model::Mount;
+use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, PlanarBase, PlanarEngine, Posed, landing, place};
+use crate::model::{Mount, Robot};
 
 impl Engine for PlanarEngine {
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError> {
@@ -98,6 +98,23 @@ impl Engine for PlanarEngine {
                 left = right;
             }
         });
+        Ok(())
+    }
+
+    fn set_joint_angles(&mut self, robot: &Robot, angles: &[f64]) -> Result<(), EngineError> {
+        let posed = Posed::new(robot, angles)?;
+        for (i, angle) in posed.directions.iter().enumerate() {
+            let (quad, lane) = place(i, self.root);
+            let at = &mut self.quads[quad];
+            at.angle.set_lane(lane, *angle);
+            at.posed.set_lane(lane, *angle);
+            at.along.iter_mut().zip([angle.cos(), angle.sin()]).for_each(|(to, value)| to.set_lane(lane, value));
+        }
+        self.fill_padding();
+        if self.mount != Mount::Clamped {
+            self.centre = [posed.centre[0], posed.centre[1] + posed.lift];
+        }
+        self.finite = false;
         Ok(())
     }
 

@@ -78,7 +78,7 @@ use self::newton::{LARGEST_STEPS, LONGEST_WHOLE, MORE_PER_BODY};
 use self::quad::Quad;
 use self::recursion::{BLOCK, BaseJoint, Clamp, Distal, Slide, Turn};
 use self::step::{set_implicit, weight_of};
-use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, LARGEST_FRICTION, PlanarBase};
+use super::{ClampHits, Contact, EnergyTerms, Engine, EngineError, JointState, LARGEST_FRICTION, PlanarBase, Posed};
 use crate::actuator::PiezoJoint;
 use crate::analytic;
 use crate::model::{Mount, RigidBody, Robot, Segment};

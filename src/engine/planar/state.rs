@@ -99,7 +99,7 @@ impl PlanarEngine {
     }
 
     /// Gives padding lanes the pose and rate of their proximal neighbours, which steps preserve.
-    fn fill_padding(&mut self) {
+    pub(super) fn fill_padding(&mut self) {
         for (k, lane) in (0..self.quads.len()).flat_map(|k| (0..4).map(move |lane| (k, lane))) {
             if self.quads[k].mass.lane(lane) > 0.0 {
                 continue;

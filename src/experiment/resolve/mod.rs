@@ -20,9 +20,11 @@ use crate::engine::FrictionModel;
 use crate::model::units::{
     ba_from_gpa, cm_from_mm, cm_from_um, cm_per_v_from_pm_per_v, cm_s2_from_m_s2, v_per_cm_from_kv_per_mm,
 };
-use crate::model::{Damping, Film, Friction, Material, ModelError, Mount, Robot, Segment};
+use crate::model::{Damping, Film, Friction, Material, ModelError, Mount, PointMass, Robot, Segment};
 use crate::words::{not_one_of, number};
 
+/// Bullet's own limit on velocities (cm/s, rad/s).
+const VELOCITY_LIMIT: f64 = 100.0;
 /// Most effects of one experiment; factors on one number stay finite together.
 const MAX_EFFECTS: usize = 100;
 
@@ -90,6 +92,17 @@ fn resolve(config: &Config, folder: &Path, bodies: Option<&[Segment]>) -> Result
     if s.friction.is_some() && engine == EngineKind::Bullet {
         return Err(Fault::new("simulation.friction", "belongs to engine = \"planar\"; Bullet has a model of its own").into());
     }
+    if let Some(limit) = s.velocity_limit {
+        let key = "simulation.velocity_limit";
+        if engine == EngineKind::Planar {
+            return Err(Fault::new(key, "belongs to engine = \"bullet\"; the planar engine limits no velocity").into());
+        }
+        if !(limit.is_finite() && limit > 0.0) {
+            return Err(Fault::new(key, format!("is {}, but must be positive", number(limit))).into());
+        }
+    }
+    let joint_angles = s.joint_angles_rad.clone().unwrap_or_default();
+    check_joint_angles(s.joint_angles_rad.as_deref(), start, robot.joints())?;
     if let Some(damping) = s.numerical_damping_per_s {
         let key = "simulation.numerical_damping_per_s";
         if engine == EngineKind::Bullet {
@@ -123,9 +136,27 @@ fn resolve(config: &Config, folder: &Path, bodies: Option<&[Segment]>) -> Result
         start,
         friction,
         numerical_damping: s.numerical_damping_per_s,
+        velocity_limit: s.velocity_limit.filter(|limit| *limit != VELOCITY_LIMIT),
+        joint_angles,
         effects,
         config: config.clone(),
     })
+}
+
+/// Checks the angles (rad) from which `joints` joints start.
+fn check_joint_angles(angles: Option<&[f64]>, start: Start, joints: usize) -> Result<(), Fault> {
+    let Some(angles) = angles else { return Ok(()) };
+    let fault = |message: String| Err(Fault::new("simulation.joint_angles_rad", message));
+    if start == Start::Settled {
+        return fault("belongs to start = \"flat\"; a settled robot has the angles of its equilibrium".into());
+    }
+    if angles.len() != joints {
+        return fault(format!("has {} angles, but the robot has {joints} joints", angles.len()));
+    }
+    match angles.iter().find(|angle| !(angle.is_finite() && angle.abs() <= std::f64::consts::FRAC_PI_2)) {
+        Some(angle) => fault(format!("holds {}, but angles must lie within a right angle", number(*angle))),
+        None => Ok(()),
+    }
 }
 
 /// The `[[effect]]` tables with their values checked; those at their off values are left out.
@@ -231,6 +262,7 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
     };
     let f = &r.friction;
     let mounts = Mount::ALL.map(|mount| (mount.name(), mount));
+    let masses = r.mass.iter().map(|mass| PointMass { mass: mass.mass_g, position: cm_from_mm(mass.position_mm) });
     let films = [("both-ends", Film::BothEnds), ("right-end", Film::RightEnd), ("none", Film::None)];
     Ok(Robot {
         material,
@@ -246,6 +278,7 @@ fn robot(config: &Config) -> Result<Robot, Fault> {
             film: choose("robot.friction.film", f.film.as_deref(), default.friction.film, &films)?,
             film_fraction: f.film_fraction.unwrap_or(default.friction.film_fraction),
         },
+        masses: masses.collect(),
         ..default
     })
 }

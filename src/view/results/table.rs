@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{ResultsError, equals, short};
+use crate::experiment::Spread;
 
 /// Largest number of panels of a figure.
 const PANELS: usize = 20;
@@ -12,6 +13,7 @@ pub(super) struct Table {
     pub(super) header: Vec<String>,
     pub(super) rows: Vec<csv::StringRecord>,
     pub(super) keys: Vec<usize>,
+    /// Those of an ensemble by their mean alone; see [`band`](Table::band).
     pub(super) measures: Vec<usize>,
 }
 
@@ -28,8 +30,23 @@ impl Table {
         if rows.is_empty() {
             return Err(wrong("there are no rows".into()));
         }
-        let (keys, measures) = (0..header.len() - 1).partition(|&i| header[i].contains('.'));
+        let (keys, mut measures): (Vec<usize>, Vec<usize>) = (0..header.len() - 1).partition(|&i| header[i].contains('.'));
+        let mean = Spread::PREFIXES[0];
+        let is_beside_mean = |&column: &usize| {
+            let of_spread =
+                |prefix: &&str| header[column].strip_prefix(prefix).is_some_and(|name| header.contains(&format!("{mean}{name}")));
+            Spread::PREFIXES[1..].iter().any(of_spread)
+        };
+        measures.retain(|column| !is_beside_mean(column));
         Ok(Self { header, rows, keys, measures })
+    }
+
+    /// The columns of the quantiles of 5 and 95 % of a mean.
+    pub(super) fn band(&self, measure: usize) -> Option<[usize; 2]> {
+        let [mean, _, low, _, high] = Spread::PREFIXES;
+        let name = self.header[measure].strip_prefix(mean)?;
+        let column = |prefix: &str| self.header.iter().position(|other| *other == format!("{prefix}{name}"));
+        Some([column(low)?, column(high)?])
     }
 
     /// Distinct values of a column: numbers by size, texts in order of appearance.
@@ -88,11 +105,18 @@ impl Table {
     pub(super) fn measure(&self, name: Option<&str>) -> Result<usize, ResultsError> {
         match name {
             None => self.measures.first().copied().ok_or_else(|| ResultsError::Table("there is no measure".into())),
-            Some(name) => self.measures.iter().copied().find(|&i| self.header[i] == name).ok_or_else(|| {
+            Some(name) => self.named(name).ok_or_else(|| {
                 let names: Vec<_> = self.measures.iter().map(|&i| self.header[i].as_str()).collect();
                 ResultsError::Choice(format!("there is no measure {name}; choose from {}", names.join(", ")))
             }),
         }
+    }
+
+    /// Column of a measure, of its mean, or of another part of its spread.
+    fn named(&self, name: &str) -> Option<usize> {
+        let mean = format!("{}{name}", Spread::PREFIXES[0]);
+        let all = || (0..self.header.len() - 1).filter(|i| !self.keys.contains(i));
+        all().find(|&i| self.header[i] == name).or_else(|| all().find(|&i| self.header[i] == mean))
     }
 
     /// Keys with a panel for each value: those `asked` for, then those with the fewest values until two are left.
