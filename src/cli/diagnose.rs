@@ -11,12 +11,14 @@ use super::output::{finish, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::diagnose::dataset::{DataError, Dataset};
 use crate::diagnose::diagnosis::Verdict;
+use crate::diagnose::identify::{self, Identification};
 use crate::diagnose::{DiagnoseError, extended, observations, pipeline, protocols, quality, report, robot::RobotPlant};
 use crate::files::{FolderLock, Locking};
 
 /// Find from measured data what the simulation gets wrong, name the cause, and measure the gain on held-out runs.
 ///
-/// Writes DIR/diagnosis.json, report.html, extended.toml (with drive.csv) and residuals.csv, and prints the verdict.
+/// Writes DIR/diagnosis.json, report.html, extended.toml (with drive.csv) and residuals.csv, and prints the verdict. Of a data set with [identify], which
+/// fits constants to single numbers: identification.json, report.html and identified.toml.
 ///
 /// Example: sfers diagnose bench-7/dataset.toml --out diagnosis
 #[derive(Debug, clap::Args)]
@@ -104,6 +106,20 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     result
 }
 
+/// Writes what was identified.
+fn identified(args: &Args, options: Options, found: &Identification, command: &str, start: Instant) -> Result<ExitCode, Failure> {
+    let json = serde_json::to_string_pretty(found).map_err(|error| unwritable(&args.out, &error))?;
+    let remarks: String = found.remarks.iter().map(|remark| format!("{remark}\n")).collect();
+    let printed = print(&if options.json { format!("{json}\n") } else { format!("{}\n{remarks}", found.summary) });
+    work().writing = true;
+    write(&args.out, "identified.toml", &found.file)?;
+    write(&args.out, "report.html", &identify::page(found, command))?;
+    write(&args.out, "identification.json", &format!("{json}\n"))?;
+    options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
+    printed?;
+    Ok(if args.require && !found.meets_all { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
 fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode, Failure> {
     let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), usize::from);
     let pool = rayon::ThreadPoolBuilder::new()
@@ -118,6 +134,11 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
     let start = Instant::now();
     let progress = |task: &str| bar.set_message(task.to_owned());
     let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
+    if dataset.is_identification() {
+        let found = pool.install(|| identify::identify(dataset, &progress));
+        bar.finish_and_clear();
+        return identified(args, options, &found?, &command, start);
+    }
     let result = pool.install(|| -> Result<_, DiagnoseError> {
         if dataset.runs.is_empty() {
             let found = observations::diagnose(dataset, &progress)?;

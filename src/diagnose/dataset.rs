@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 use thiserror::Error;
 
+use super::identify::{Identify, Space};
 use crate::experiment::{Config, ConfigError, DriveConfig, EffectConfig, MaterialConfig, RobotConfig, SimulationConfig};
 use crate::model::Robot;
 
@@ -64,6 +65,7 @@ pub(crate) struct Description {
     frequency_response: Vec<ResponseEntry>,
     steady: Vec<Steady>,
     observation: Vec<Observation>,
+    identify: Option<Identify>,
 }
 
 /// `[camera]`: how frames become rows.
@@ -242,6 +244,27 @@ pub struct Observation {
     /// Length and steps of the run.
     #[serde(default)]
     pub simulation: SimulationConfig,
+    /// What an identification does with it.
+    #[serde(default)]
+    pub role: ObservationRole,
+}
+
+impl Observation {
+    /// Whether an identification foretells it without seeing it.
+    pub fn is_foretold(&self) -> bool {
+        self.role == ObservationRole::Foretell
+    }
+}
+
+/// The part of an observation in an identification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObservationRole {
+    /// Constants are fitted to it.
+    #[default]
+    Fit,
+    /// It is foretold from the others.
+    Foretell,
 }
 
 /// The part of a run in the analysis.
@@ -342,11 +365,18 @@ pub struct Dataset {
     pub runs: Vec<MeasuredRun>,
     /// Single measured numbers, in place of runs.
     pub observations: Vec<Observation>,
+    /// The constants that are to be identified from them.
+    pub(super) identify: Option<(Identify, Space)>,
 }
 
 pub(super) const AXES: [&str; 2] = ["x", "z"];
 
 impl Dataset {
+    /// Whether constants are to be identified from its observations.
+    pub fn is_identification(&self) -> bool {
+        self.identify.is_some()
+    }
+
     /// Names of the channels: `NAME_x` and `NAME_z` of every marker.
     pub fn channel_names(&self) -> Vec<String> {
         self.markers.iter().flat_map(|marker| AXES.map(|axis| format!("{}_{axis}", marker.name))).collect()

@@ -4,7 +4,7 @@
 //! [`plant`] is the measured system with its model; [`robot`] is the plant of this crate's robots. [`fit`] is bounded least squares; [`search`] selects
 //! causes on runs that no fit saw, by their [`split`]; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
 //! [residual tests](residual_tests) of the final model, in a [`diagnosis`]. [`protocols`] proposes the next measurement; [`report`] and [`extended`]
-//! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers.
+//! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers, [`identify`] fits constants to many of them.
 //!
 //! # References
 //! G. Kerschen, K. Worden, A. F. Vakakis and J.-C. Golinval, "Past, present and future of nonlinear system identification in structural dynamics",
@@ -23,6 +23,7 @@ mod error;
 pub mod extended;
 mod faults;
 pub mod fit;
+pub mod identify;
 mod intervals;
 pub mod names;
 mod naming;

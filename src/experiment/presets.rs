@@ -49,6 +49,7 @@ presets! {
     "mover"
     "mover-delay"
     "mover-three-phase"
+    "published-speeds"
     "static-shape"
 }
 
@@ -77,6 +78,7 @@ presets! {
     "jumper-delay-scan"
     "jumper-length-scan"
     "mover-delay-scan"
+    "published-speeds-scan"
     "speed-frequency-scan"
 }
 

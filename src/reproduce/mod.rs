@@ -7,6 +7,7 @@ mod cantilever;
 mod findings;
 mod jumping;
 mod page;
+mod speeds;
 mod walking;
 
 pub use bench::Bench;
@@ -143,5 +144,5 @@ pub const STUDIES: [Study; 10] = [
         cost_s: [15.0, 15.0],
         run: jumping::over_on_time,
     },
-    Study { id: "speed", title: "Speed against frequency", section: "IV", cost_s: [54.0, 58.0], run: walking::speed },
+    Study { id: "speed", title: "Speed against frequency", section: "IV", cost_s: [54.0, 58.0], run: speeds::speed },
 ];

@@ -1,26 +1,11 @@
-//! The five-actuator robot at rest and walking: sections III-B and IV.
+//! The five-actuator robot at rest and walking slowly: section III-B.
 
-use super::{Bench, Findings, Origin, StudyError, curve};
+use super::{Bench, Findings, Origin, StudyError};
 use crate::view::page::WHOLE;
 use crate::view::{Figure, Mark, fixed, minus, shape, signed};
 
-/// Voltages of the real robot, the gain that converts them to those of the authors' code, and friction. The paper gives no coefficients of friction;
-/// these are the defaults of this program, not fitted to any result.
-const REAL: [&str; 4] = [
-    "drive.on_voltages_v=[300,300,-1500,300,300]",
-    "robot.positive_gain=1.733",
-    "robot.friction.low=0.2",
-    "robot.friction.high=4.0",
-];
-
-/// Frequencies (Hz) of the spot checks on Bullet, and their time step (s).
-const SPOTS_HZ: [f64; 5] = [2.0, 5.0, 8.0, 10.0, 14.0];
-const SPOTS_STEP: f64 = 1e-5;
-/// Measured travel per cycle at 1 Hz (mm), and highest frequency with inchworm motion (Hz).
-const STRIDE: f64 = 1.9;
-const FORWARD_TO_HZ: i32 = 3;
-/// Measured speeds: frequency (Hz), speed (mm/s).
-const SPEEDS: [(f64, f64); 2] = [(8.0, -7.0), (14.0, 12.0)];
+/// Measured travel per cycle at 1 Hz (mm).
+pub(super) const STRIDE: f64 = 1.9;
 
 /// Static shapes of the five-actuator robot.
 pub fn shapes(bench: &Bench) -> Result<Findings, StudyError> {
@@ -94,53 +79,5 @@ pub fn inchworm(bench: &Bench) -> Result<Findings, StudyError> {
     findings.caption = "Both ends and their mean over five cycles of the paper's sequence, from the end of the first cycle. The paper gives the travel \
                         of a cycle, drawn at the end of each; it gives no accuracy."
         .into();
-    Ok(findings)
-}
-
-/// Speed against frequency.
-pub fn speed(bench: &Bench) -> Result<Findings, StudyError> {
-    let (sweep, points) = bench.sweep("speed", "speed-frequency-scan", &REAL)?;
-    let speeds = curve(&sweep, &points, sweep.axes.len() - 1, 0);
-    let mut findings = Findings::default();
-    let at = |f: f64| speeds.iter().find(|p| p.0 == f).map_or(f64::NAN, |p| p.1);
-    let told = |speed: f64| {
-        if speed.is_finite() { format!("{} mm/s", signed(speed, 2)) } else { "none".into() }
-    };
-    let forward = (1..=20).take_while(|&f| at(f64::from(f)) > 0.0).last().unwrap_or(0);
-    findings.compare(
-        "inchworm motion goes forward up to",
-        "3 Hz (measured)",
-        format!("{forward} Hz"),
-        format!("{} Hz", signed(f64::from(forward - FORWARD_TO_HZ), 0)),
-        "Forward motion lasts longer here; friction, which decides it, is not specified.",
-    );
-    let bullet = bench.spots("speed", &sweep, SPOTS_STEP, &SPOTS_HZ)?;
-    findings.done_on(bench.effort, SPOTS_STEP);
-    for &(f, on_bullet) in &bullet {
-        let ours = at(f);
-        let published = SPEEDS.iter().find(|(at, _)| *at == f).map(|(_, speed)| *speed);
-        let difference = published.map(|speed| format!("{} mm/s", signed(ours - speed, 1))).filter(|_| ours.is_finite());
-        let explanation = match published {
-            Some(_) => {
-                "Sign and size of the fast speeds follow from friction and from how long contacts last, neither of which the paper specifies."
-            }
-            None => "",
-        };
-        let published = published.map_or_else(String::new, |speed| format!("{} mm/s (measured)", signed(speed, 0)));
-        findings.compare(&format!("speed at {f} Hz"), &published, told(ours), difference.unwrap_or_default(), explanation);
-        findings.check_on_bullet("mm/s", ours, on_bullet);
-    }
-    findings.without_result(&speeds);
-    let (low, high) =
-        speeds.iter().chain(&bullet).chain(&SPEEDS).map(|p| p.1).fold((0.0, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
-    let mut figure = Figure::new("Speed of the inchworm sequence", "frequency (Hz)", "speed (mm/s)");
-    figure.setting("(300, 300, −1500, 300, 300) V, friction 0.2 and 4.0").size(WHOLE);
-    figure.horizontal(0.0);
-    figure.series("planar engine", speeds, Mark::Both);
-    figure.series("Bullet", bullet, Mark::Points);
-    findings.publish(&mut figure, "measured", Origin::Measured, &SPEEDS, None);
-    findings.publish_up(&mut figure, "measured: forward up to 3 Hz", Origin::Measured, f64::from(FORWARD_TO_HZ), [low, high]);
-    findings.figure = figure.svg();
-    findings.caption = "Mean speed over the second half of 3 s. The paper gives two speeds, without their accuracy, and the frequency up to which the robot goes forward.".into();
     Ok(findings)
 }

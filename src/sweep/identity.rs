@@ -20,10 +20,11 @@ impl Sweep {
         let axes: Vec<_> = self.axes.iter().map(|axis| json!({"key": axis.key, "values": axis.values})).collect();
         let settings: Vec<_> = self.source.settings().iter().map(|setting| json!([setting.key, setting.value])).collect();
         json!({
-            "schema": 2,
+            "schema": 3,
             PROGRAMS: [PROGRAM],
             "experiment": self.source.text(),
             "settings": settings,
+            "ensemble": self.is_ensemble,
             "measures": self.measures,
             "vary": axes,
             "files": self.files,

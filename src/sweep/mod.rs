@@ -180,6 +180,13 @@ impl Sweep {
         Self::with_settings(&name, &text, path.parent().unwrap_or(Path::new("")), settings)
     }
 
+    /// The same sweep of the experiment as it is written, without its `[ensemble]`.
+    #[must_use]
+    pub fn without_ensemble(mut self) -> Self {
+        self.is_ensemble = false;
+        self
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.axes.iter().map(|axis| axis.values.len()).product()
@@ -220,7 +227,7 @@ impl Sweep {
     /// # Errors
     /// [`ConfigError`] if the point, or a perturbed one, is not a valid experiment.
     pub fn members(&self, index: usize) -> Result<Vec<Experiment>, ConfigError> {
-        ensemble::members(&self.source_of(index)?)
+        if self.is_ensemble { ensemble::members(&self.source_of(index)?) } else { Ok(vec![self.experiment(index)?]) }
     }
 
     fn source_of(&self, index: usize) -> Result<Source, ConfigError> {

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use super::super::identify::Space;
 use super::super::observations;
 use super::super::observations::ObservationError;
 use super::super::run_csv;
-use super::{Camera, Column, DataError, Dataset, Description, Marker, MeasuredRun};
+use super::{Camera, Column, DataError, Dataset, Description, Marker, MeasuredRun, Observation};
 use crate::effects::{self, Kind};
 use crate::experiment::{self, Config, ConfigError, DriveConfig, EffectConfig, SimulationConfig, Source, StepConfig, presets};
 use crate::model::Robot;
@@ -159,6 +160,28 @@ impl Dataset {
                 ObservationError::Other(error) => error.into(),
             })?;
         }
+        if let (None, Some(index)) = (&description.identify, observations.iter().position(Observation::is_foretold)) {
+            let number = index.to_string();
+            let key = format!("observation {}: role", index + 1);
+            let message = "foretell belongs to a data set with [identify]";
+            return Err(value_error(path, &text, &["observation", &number, "role"], &key, message));
+        }
+        let identify = description.identify.map(|identify| {
+            let checked = if has_runs {
+                Err((None, "is for [[observation]] tables; causes of runs are found without it".into()))
+            } else if observations.iter().all(Observation::is_foretold) {
+                Err((None, "has nothing to fit: every [[observation]] is to be foretold".into()))
+            } else {
+                Space::new(&identify).and_then(|space| space.check(&nominal, &observations).map(|()| space))
+            };
+            checked.map(|space| (identify, space)).map_err(|(key, message): (Option<String>, String)| {
+                let parts: Vec<&str> =
+                    ["identify"].into_iter().chain(key.iter().flat_map(|key| ["vary", key.as_str()])).collect();
+                let shown = key.as_ref().map_or_else(|| "identify".to_owned(), |key| format!("identify.vary.\"{key}\""));
+                value_error(path, &text, &parts, &shown, message)
+            })
+        });
+        let identify = identify.transpose()?;
         let name = if description.dataset.name.is_empty() {
             path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
         } else {
@@ -175,6 +198,7 @@ impl Dataset {
             camera,
             runs,
             observations,
+            identify,
         })
     }
 }

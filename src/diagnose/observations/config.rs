@@ -13,7 +13,7 @@ const STEP: f64 = 2e-4;
 const RECORD: f64 = 1e-3;
 
 /// The experiment of an observation. A resonance under a sine without frequency is measured on the ringing after a step.
-pub(super) fn config(nominal: &Config, observation: &Observation) -> Result<Config, DiagnoseError> {
+pub(in crate::diagnose) fn config(nominal: &Config, observation: &Observation) -> Result<Config, DiagnoseError> {
     let config = overridden(nominal, &observation.robot, &observation.material)
         .map_err(|reason| DiagnoseError::Observation { measure: observation.measure.clone(), reason })?;
     let mut config = Config { drive: observation.drive.clone(), simulation: observation.simulation.clone(), ..config };

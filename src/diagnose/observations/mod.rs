@@ -6,7 +6,7 @@ mod config;
 #[cfg(feature = "view")]
 mod page;
 
-pub(super) use config::{ObservationError, check};
+pub(super) use config::{ObservationError, check, config};
 #[cfg(feature = "view")]
 pub use page::page;
 
@@ -21,7 +21,6 @@ use super::visited::Visited;
 use crate::effects::{self, Bench, EffectError};
 use crate::experiment::{self, Control, EffectConfig, Source};
 use crate::number::fixed;
-use config::config;
 
 /// Largest χ² per number of a model that explains them: 2 σ (rms).
 const EXPLAINED: f64 = 4.0;
@@ -98,7 +97,7 @@ pub struct Found {
 }
 
 /// The drive of an observation in words.
-fn setting(observation: &Observation) -> String {
+pub(super) fn setting(observation: &Observation) -> String {
     let drive = &observation.drive;
     let volts = drive.voltages_v.clone().or(drive.amplitudes_v.clone()).or(drive.amplitude_v.map(|volts| vec![volts]));
     let volts = volts.unwrap_or_default().iter().map(|volts| fixed(*volts, 0)).collect::<Vec<_>>().join(", ");

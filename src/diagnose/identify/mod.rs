@@ -1,0 +1,210 @@
+//! Identification of constants from single measured numbers at many settings, as the speeds of a walking robot over frequency.
+//!
+//! The path, for every combination of the constants that have only some values:
+//!
+//! 1. *Globally*: runs scattered over all ranges, then CMA-ES (Hansen and Ostermeier 2001) on a sum of ln(1 + r²/2σ²), which counts the numbers that are met and does not
+//!    care by how much others are missed: chaos may spoil some.
+//! 2. *Locally*, in waves: runs scattered over a region, [quadratic models](emulator) with the scatter about them, the region in which their
+//!    [likelihood](profile) is not negligible, again, until it shrinks no more (history matching; Craig et al. 1997).
+//! 3. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
+//!    of a similar measurement would be worth most.
+
+mod constants;
+mod emulator;
+#[cfg(feature = "view")]
+mod page;
+mod profile;
+mod region;
+mod results;
+
+pub(in crate::diagnose) use constants::Space;
+pub use constants::{Identify, Searched};
+#[cfg(feature = "view")]
+pub use page::page;
+pub use results::{Corner, Fact, Identification, Identified, Listed, Proposal};
+
+use std::sync::Mutex;
+
+use cmaes::{CMAESOptions, DVector};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rayon::prelude::*;
+
+use self::constants::Point;
+use self::emulator::{Emulator, coefficients};
+use self::profile::Likelihood;
+use self::region::Region;
+use super::DiagnoseError;
+use super::dataset::{Dataset, Observation};
+use crate::experiment::Config;
+
+/// Scattered runs per constant and one more, of every combination.
+const SCATTERED: usize = 24;
+/// Runs in a generation of CMA-ES, and generations.
+const POPULATION: usize = 12;
+const GENERATIONS: usize = 16;
+/// Combinations go on whose best point is this much above the best of all.
+const HOPEFUL: f64 = 8.0;
+/// Points up to this much above the best of a combination make its first region.
+const NEAR: f64 = 5.0;
+/// Rise of −2 ln L at the edge of the next region: five standard deviations of a single constant.
+const KEPT: f64 = 25.0;
+/// Runs per coefficient of the quadratic models in a wave, at least so many in all, and waves at most.
+const RUNS_PER_COEFFICIENT: usize = 8;
+const LEAST_RUNS: usize = 90;
+const WAVES: usize = 7;
+/// A region that shrinks to no less than this share is the last.
+const SETTLED: f64 = 0.7;
+/// Residual (σ) of a number that no run gives.
+const MISSING: f64 = 50.0;
+
+/// A point with what every observation would be there.
+#[derive(Debug, Clone)]
+struct Run {
+    point: Point,
+    values: Vec<Option<f64>>,
+}
+
+/// The search at work.
+struct Search<'a> {
+    nominal: &'a Config,
+    space: &'a Space,
+    /// The observations that are fitted.
+    fitted: Vec<&'a Observation>,
+    /// Their values and standard deviations.
+    observed: Vec<(f64, f64)>,
+    seed: u64,
+}
+
+/// What was found for one combination of values.
+struct Found {
+    level: usize,
+    emulator: Emulator,
+    best: (Vec<f64>, f64),
+}
+
+/// Identifies the constants of `[identify]` from the data set's observations.
+///
+/// # Errors
+/// [`DiagnoseError`] if no run of the search gives the measured numbers.
+pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<Identification, DiagnoseError> {
+    let Some((identify, space)) = &dataset.identify else { return Err("the data set has no [identify]".into()) };
+    let fitted: Vec<&Observation> = dataset.observations.iter().filter(|observation| !observation.is_foretold()).collect();
+    let observed = fitted.iter().map(|observation| (observation.value, observation.sigma)).collect();
+    let search = Search { nominal: &dataset.nominal, space, fitted, observed, seed: identify.seed };
+    let mut runs = Vec::new();
+    let mut scores = Vec::new();
+    for level in 0..space.levels.len() {
+        progress(&format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
+        let found = search.everywhere(level);
+        scores.push(found.iter().map(|run| search.score(&run.values)).fold(f64::INFINITY, f64::min));
+        runs.extend(found);
+    }
+    let best = scores.iter().copied().fold(f64::INFINITY, f64::min);
+    let hopeful: Vec<usize> = (0..scores.len()).filter(|level| scores[*level] <= best + HOPEFUL).collect();
+    let mut found = Vec::new();
+    for level in hopeful {
+        found.extend(search.closely(level, scores[level], &mut runs, progress));
+    }
+    results::results(&search, dataset, found, runs.len(), progress)
+}
+
+impl Search<'_> {
+    /// What every fitted observation would be at the points, in parallel.
+    fn evaluate(&self, points: Vec<Point>) -> Vec<Run> {
+        let run = |point: Point| {
+            let predict = |observation: &&Observation| self.space.predict(self.nominal, observation, &point);
+            let values = self.fitted.par_iter().map(predict).collect();
+            Run { point, values }
+        };
+        points.into_par_iter().with_max_len(1).map(run).collect()
+    }
+
+    /// Σ ln(1 + r²/2), r the residual over σ.
+    fn score(&self, values: &[Option<f64>]) -> f64 {
+        let of = |(predicted, (value, sigma)): (&Option<f64>, &(f64, f64))| {
+            let residual = predicted.map_or(MISSING, |predicted| (predicted - value) / sigma);
+            (0.5 * residual * residual).ln_1p()
+        };
+        values.iter().zip(&self.observed).map(of).sum()
+    }
+
+    fn random(&self, level: usize, stage: u64) -> ChaCha8Rng {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(1000 * level as u64 + stage);
+        random
+    }
+
+    /// Runs scattered over all ranges, and those of CMA-ES from the best of them.
+    fn everywhere(&self, level: usize) -> Vec<Run> {
+        let constants = self.space.constants.len();
+        if constants == 0 {
+            return self.evaluate(vec![Point { level, x: Vec::new() }]);
+        }
+        let scattered = Region::whole(constants).scattered(SCATTERED * (constants + 1), &mut self.random(level, 0));
+        let mut runs = self.evaluate(scattered.into_iter().map(|x| Point { level, x }).collect());
+        let best = runs.iter().min_by(|a, b| self.score(&a.values).total_cmp(&self.score(&b.values)));
+        let start = best.map_or_else(|| vec![0.5; constants], |run| run.point.x.clone());
+        let seen = Mutex::new(Vec::new());
+        let objective = |x: &DVector<f64>| {
+            let inside: Vec<f64> = x.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+            let outside: f64 = x.iter().zip(&inside).map(|(x, inside)| (x - inside).powi(2)).sum();
+            let run = self.evaluate(vec![Point { level, x: inside }]).remove(0);
+            let score = self.score(&run.values) + 100.0 * outside;
+            seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(run);
+            score
+        };
+        let options = CMAESOptions::new(start, 0.15).population_size(POPULATION).max_generations(GENERATIONS).seed(self.seed);
+        if let Ok(mut search) = options.build(objective) {
+            search.run_parallel();
+        }
+        let mut seen = seen.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        // In an order that does not depend on threads.
+        let compare = |a: &Run, b: &Run| a.point.x.iter().zip(&b.point.x).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
+        seen.sort_by(|a, b| compare(a, b).unwrap_or(std::cmp::Ordering::Equal));
+        runs.extend(seen);
+        runs
+    }
+
+    /// Waves of runs in ever smaller regions around the likely points; `None` if they give no measures.
+    fn closely(&self, level: usize, best: f64, runs: &mut Vec<Run>, progress: &(dyn Fn(&str) + Sync)) -> Option<Found> {
+        let constants = self.space.constants.len();
+        let near = |run: &&Run| run.point.level == level && self.score(&run.values) <= best + NEAR;
+        let mut region = Region::around(runs.iter().filter(near).map(|run| &run.point.x[..]), 0.1, 0.06)?;
+        let mut found = None;
+        for wave in 1..=WAVES {
+            progress(&format!("wave {wave} around the best, {} runs so far", runs.len()));
+            let count = LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants));
+            let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
+            let fresh = region.scattered(count.saturating_sub(inside).max(count / 2), &mut self.random(level, wave as u64));
+            runs.extend(self.evaluate(fresh.into_iter().map(|x| Point { level, x }).collect()));
+            let own = || runs.iter().filter(|run| run.point.level == level);
+            let emulator = Emulator::fit(region.clone(), own().map(|run| (&run.point.x[..], &run.values[..])), self.fitted.len());
+            let likelihood = Likelihood { emulator: &emulator, observed: &self.observed, without: None };
+            // From the best runs within the region.
+            let mut starts: Vec<&Run> = own().filter(|run| region.holds(&run.point.x)).collect();
+            starts.sort_by(|a, b| likelihood.misfit(&a.point.x).total_cmp(&likelihood.misfit(&b.point.x)));
+            let best = likelihood.best(starts.iter().take(6).map(|run| run.point.x.clone()))?;
+            let ends: Vec<_> = (0..constants).flat_map(|at| likelihood.range(&best, at, KEPT)).collect();
+            let mut next = Region::around(ends.iter().map(|end| &end.x[..]), 0.1, 0.0)?;
+            let mut is_wider = false;
+            for (at, pair) in ends.chunks_exact(2).enumerate() {
+                let width = region.high[at] - region.low[at];
+                // The likely points go on beyond the region.
+                if pair[0].is_edge && region.low[at] > 0.0 {
+                    (next.low[at], is_wider) = ((region.low[at] - 0.4 * width).max(0.0), true);
+                }
+                if pair[1].is_edge && region.high[at] < 1.0 {
+                    (next.high[at], is_wider) = ((region.high[at] + 0.4 * width).min(1.0), true);
+                }
+            }
+            let is_settled = !is_wider && next.volume() > SETTLED * region.volume();
+            found = Some(Found { level, emulator: emulator.clone(), best });
+            if is_settled || constants == 0 {
+                break;
+            }
+            region = next;
+        }
+        found
+    }
+}
