@@ -56,6 +56,7 @@ presets! {
 presets! {
     DATASETS "datasets/"
     "published-cantilever"
+    "published-robot"
 }
 
 presets! {

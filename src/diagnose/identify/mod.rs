@@ -6,9 +6,11 @@
 //!    care by how much others are missed: chaos may spoil some.
 //! 2. *Locally*, in waves: runs scattered over a region, [quadratic models](emulator) with the scatter about them, the region in which their
 //!    [likelihood](profile) is not negligible, again, until it shrinks no more (history matching; Craig et al. 1997).
-//! 3. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
+//! 3. The best points are [confirmed](confirm) by ensembles of runs.
+//! 4. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
 //!    of a similar measurement would be worth most.
 
+mod confirm;
 mod constants;
 mod emulator;
 #[cfg(feature = "view")]
@@ -106,7 +108,7 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
     for level in hopeful {
         found.extend(search.closely(level, scores[level], &mut runs, progress));
     }
-    results::results(&search, dataset, found, runs.len(), progress)
+    results::results(&search, dataset, found, &runs, progress)
 }
 
 impl Search<'_> {

@@ -32,6 +32,9 @@ pub fn page(found: &Identification, command: &str) -> String {
         "#predicted",
         "#± scatter",
         "#off by (σ)",
+        "#confirmed, mean",
+        "#± sd",
+        "#off by (σ)",
         "#the others foretell",
         "#off by (σ)",
         "#decides (×)",
@@ -51,6 +54,9 @@ pub fn page(found: &Identification, command: &str) -> String {
             fixed(fact.predicted, digits).into(),
             fixed(fact.scatter, digits).into(),
             off(fact.off_sigma),
+            fact.confirmed.map_or_else(String::new, |[mean, ..]| fixed(mean, digits)).into(),
+            fact.confirmed.map_or_else(String::new, |[_, sd, _]| fixed(sd, digits)).into(),
+            fact.confirmed.map_or_else(|| "".into(), |[.., z]| off(z)),
             others.map_or_else(String::new, |[value, sd, _]| format!("{} ± {}", fixed(value, digits), fixed(sd, digits))).into(),
             others.map_or_else(|| "".into(), |[.., z]| off(z)),
             fixed(fact.decides, 2).into(),
@@ -58,7 +64,7 @@ pub fn page(found: &Identification, command: &str) -> String {
     }
     out.push_str(&table.html());
     out.push_str(
-        "<p class=\"small\">Scatter is that of the motion, which small changes of the constants do not repeat. “Decides” is the factor by which the ranges \
+        "<p class=\"small\">Scatter is that of the motion, which small changes of the constants do not repeat. Confirmed values are of an ensemble of runs. “Decides” is the factor by which the ranges \
          widen without the number.</p>\n",
     );
     out.push_str(&curves(found));

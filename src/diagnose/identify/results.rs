@@ -12,14 +12,13 @@ use super::super::observations::setting;
 use super::constants::{self, Point};
 use super::emulator::Emulator;
 use super::profile::{Likelihood, RANGE};
-use super::{Found, Search};
+use super::confirm::Confirmed;
+use super::{Found, Run, Search};
 use crate::experiment::Spread;
 use crate::words::split_unit;
 
 /// Correlation from which on two constants are tied.
 const TIED: f64 = 0.9;
-/// Residual (σ) from which on a number is not met.
-const MISSED: f64 = 3.0;
 /// Runs from the likely constants for a prediction.
 const DRAWS: usize = 24;
 /// Most settings that are compared as next measurements.
@@ -36,8 +35,10 @@ pub struct Identification {
     pub dataset: String,
     /// The result in sentences.
     pub summary: String,
-    /// True if a constant set meets every number within three standard deviations.
+    /// True if the confirmed constants meet every number: the mean over an ensemble lies within two standard deviations.
     pub meets_all: bool,
+    /// The constants that were simulated as an ensemble and come closest.
+    pub confirmed: Vec<(String, f64)>,
     /// True if there are fewer numbers than constants, or the ranges of some constants end at those of the search: the answer is a set.
     pub is_set: bool,
     /// Residuals over their standard deviations, rms.
@@ -109,6 +110,10 @@ pub struct Fact {
     pub scatter: f64,
     /// Distance of both over their standard deviations together.
     pub off_sigma: f64,
+    /// With the confirmed constants: mean and standard deviation over an ensemble of eight close by, and the distance of the measured value from that mean over the
+    /// standard deviation of both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<[f64; 3]>,
     /// What the other numbers foretell, with its standard deviation and the distance over both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_others: Option<[f64; 3]>,
@@ -192,7 +197,7 @@ pub(super) fn results(
     search: &Search,
     dataset: &Dataset,
     mut found: Vec<Found>,
-    simulated: usize,
+    runs: &[Run],
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Identification, DiagnoseError> {
     found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
@@ -211,13 +216,15 @@ pub(super) fn results(
         Listed { key: key.clone(), value: space.levels[best.level][at], possible: values }
     });
     let likely = Likely::new(search, best, None).ok_or("the information matrix cannot be inverted")?;
+    progress("confirming the best");
+    let likely_points = possible.iter().map(|found| Point { level: found.level, x: found.best.0.clone() });
+    let confirmed = search.confirmed(likely_points, runs).ok_or("no point can be confirmed")?;
     progress("predictions");
     let mut random = search.random(best.level, 900);
     let points = likely.draws(&mut random);
-    let facts = facts(search, dataset, &likely, &points, &mut remarks);
+    let facts = facts(search, dataset, &likely, &points, &confirmed, &mut remarks);
     let next = proposals(search, &likely, &points);
     let fitted: Vec<&Fact> = facts.iter().filter(|fact| fact.is_fitted).collect();
-    let meets_all = fitted.iter().all(|fact| fact.off_sigma.abs() <= MISSED);
     let misfit_sigma = (fitted.iter().map(|fact| fact.off_sigma.powi(2)).sum::<f64>() / fitted.len().max(1) as f64).sqrt();
     let fewer = search.fitted.len() < space.constants.len() + space.listed.len();
     let is_set = fewer || constants.iter().any(|constant: &Identified| constant.at_bound == [true, true]);
@@ -225,12 +232,13 @@ pub(super) fn results(
         remarks.push("some ranges end where the search does; widen [identify.vary] to see more".into());
     }
     let last = search.fitted.last().copied().ok_or("there is nothing to fit")?;
-    let file = constants::file(space, search.nominal, last, &Point { level: best.level, x: best.best.0.clone() })?;
+    let file = constants::file(space, search.nominal, last, &confirmed.point)?;
     let mut result = Identification {
         schema: 1,
         dataset: dataset.name.clone(),
         summary: String::new(),
-        meets_all,
+        meets_all: confirmed.meets_all(search),
+        confirmed: space.settings(&confirmed.point).map(|(key, value)| (key.to_owned(), value)).collect(),
         is_set,
         misfit_sigma,
         constants,
@@ -238,11 +246,11 @@ pub(super) fn results(
         facts,
         corners,
         next,
-        simulated,
+        simulated: runs.len(),
         remarks,
         file,
     };
-    result.summary = summary(&result, fewer);
+    result.summary = summary(&result, search, &confirmed, fewer);
     Ok(result)
 }
 
@@ -290,7 +298,14 @@ fn constants_of(search: &Search, best: &Found, possible: &[&Found]) -> (Vec<Iden
 }
 
 /// All numbers with what is predicted of them.
-fn facts(search: &Search, dataset: &Dataset, likely: &Likely, points: &[Point], remarks: &mut Vec<String>) -> Vec<Fact> {
+fn facts(
+    search: &Search,
+    dataset: &Dataset,
+    likely: &Likely,
+    points: &[Point],
+    confirmed: &Confirmed,
+    remarks: &mut Vec<String>,
+) -> Vec<Fact> {
     let Found { emulator, best, .. } = likely.found;
     let fact = |observation: &Observation, is_fitted: bool| Fact {
         measure: observation.measure.clone(),
@@ -302,12 +317,14 @@ fn facts(search: &Search, dataset: &Dataset, likely: &Likely, points: &[Point], 
         predicted: f64::NAN,
         scatter: f64::NAN,
         off_sigma: f64::NAN,
+        confirmed: None,
         from_others: None,
         decides: 1.0,
     };
     let mut facts = Vec::new();
     for (at, observation) in search.fitted.iter().enumerate() {
         let mut fact = fact(observation, true);
+        fact.confirmed = confirmed.spreads[at].map(|spread| [spread.mean, spread.sd, confirmed.off(search, at)]);
         let Some(surface) = &emulator.surfaces[at] else {
             remarks.push(format!("{} ({}) is left out: most runs do not give it", fact.measure, fact.setting));
             continue;
@@ -398,17 +415,22 @@ pub(super) fn told(key: &str, value: f64) -> String {
     format!("{}{unit}", crate::number::fixed(value, digits))
 }
 
-fn summary(result: &Identification, fewer: bool) -> String {
-    let missed: Vec<String> = result
-        .facts
-        .iter()
-        .filter(|fact| fact.is_fitted && fact.off_sigma.abs() > MISSED)
-        .map(|fact| format!("{} ({}) is off by {} σ", fact.measure, fact.setting, crate::number::fixed(fact.off_sigma, 1)))
+fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewer: bool) -> String {
+    let missed: Vec<String> = (0..search.fitted.len())
+        .filter(|at| !confirmed.meets(search, *at))
+        .map(|at| {
+            let observation = search.fitted[at];
+            let mean = confirmed.spreads[at].map_or_else(|| "nothing".into(), |spread| crate::number::fixed(spread.mean, 2));
+            let under = frequency(observation).map_or_else(|| setting(observation), |f| format!("{} Hz", crate::number::fixed(f, 1)));
+            format!("{} at {under} is {mean}, not {}", observation.measure, crate::number::fixed(observation.value, 2))
+        })
         .collect();
+    let constants = result.confirmed.iter().map(|(key, value)| format!("{key} = {}", told(key, *value))).collect::<Vec<_>>();
+    let constants = constants.join(", ");
     let met = if missed.is_empty() {
-        "One constant set meets every number within three standard deviations of measurement and motion.".to_owned()
+        format!("A robot with {constants} meets every number: the means of eight runs lie within two standard deviations.")
     } else {
-        format!("No constant set within the ranges meets every number; with the best one {}.", missed.join(", "))
+        format!("No constants within the ranges were found that meet every number; closest comes {constants}, where {}.", missed.join("; "))
     };
     let ranges = result.constants.iter().map(|c| {
         format!("{} = {} ({} to {})", c.key, told(&c.key, c.value), told(&c.key, c.range95[0]), told(&c.key, c.range95[1]))

@@ -1,0 +1,117 @@
+//! A constant set that is simulated again and again, so that what it is said to meet it does meet.
+//!
+//! Quadratic models say which constants are likely; over wide regions their scatter hides what they lack. Hence the most likely points, and the best of all
+//! that were simulated, are run as ensembles of points close by. If none meets every number, CMA-ES searches on with the means of such ensembles.
+
+use std::sync::Mutex;
+
+use cmaes::{CMAESOptions, DVector};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::constants::Point;
+use super::{Run, Search};
+use crate::experiment::Spread;
+
+/// Members of an ensemble, and the standard deviation of their coordinates.
+const MEMBERS: usize = 8;
+const JITTER: f64 = 0.002;
+/// Points that are confirmed.
+const POINTS: usize = 12;
+/// Distance (standard deviations) up to which a mean meets a number.
+const MET: f64 = 2.0;
+/// Generations of the search by means, and runs in one.
+const GENERATIONS: usize = 24;
+const POPULATION: usize = 12;
+/// Distance of a number that most members do not give.
+const MISSING: f64 = 50.0;
+
+/// A point with the spread of every fitted number over its ensemble.
+#[derive(Debug, Clone)]
+pub(super) struct Confirmed {
+    pub point: Point,
+    pub spreads: Vec<Option<Spread>>,
+}
+
+impl Confirmed {
+    /// Distance of number `at` from the mean over the standard deviation of both.
+    pub fn off(&self, search: &Search, at: usize) -> f64 {
+        let (value, sigma) = search.observed[at];
+        self.spreads[at].map_or(MISSING, |spread| (value - spread.mean) / sigma.hypot(spread.sd / (MEMBERS as f64).sqrt()))
+    }
+
+    pub fn meets(&self, search: &Search, at: usize) -> bool {
+        self.off(search, at).abs() <= MET
+    }
+
+    pub fn meets_all(&self, search: &Search) -> bool {
+        (0..search.fitted.len()).all(|at| self.meets(search, at))
+    }
+
+    fn misfit(&self, search: &Search) -> f64 {
+        (0..search.fitted.len()).map(|at| self.off(search, at).powi(2)).sum()
+    }
+}
+
+impl Search<'_> {
+    /// Runs the ensemble of a point.
+    fn confirm(&self, point: &Point, random: &mut ChaCha8Rng) -> Confirmed {
+        let mut member = |index: usize| {
+            let mut near = |x: &f64| {
+                let z: f64 = StandardNormal.sample(random);
+                if index == 0 { *x } else { (x + JITTER * z).clamp(0.0, 1.0) }
+            };
+            Point { level: point.level, x: point.x.iter().map(&mut near).collect() }
+        };
+        let runs = self.evaluate((0..MEMBERS).map(&mut member).collect());
+        let spread = |at: usize| {
+            let values: Vec<f64> = runs.iter().filter_map(|run| run.values[at]).collect();
+            (2 * values.len() > MEMBERS).then(|| Spread::of(&values))
+        };
+        Confirmed { point: point.clone(), spreads: (0..self.fitted.len()).map(spread).collect() }
+    }
+
+    /// The point whose ensemble is closest to the numbers: one of the `likely`, of the best `runs`, or of a search from there.
+    pub(super) fn confirmed(&self, likely: impl Iterator<Item = Point>, runs: &[Run]) -> Option<Confirmed> {
+        let mut sorted: Vec<&Run> = runs.iter().collect();
+        sorted.sort_by(|a, b| self.score(&a.values).total_cmp(&self.score(&b.values)));
+        let points: Vec<Point> = likely.chain(sorted.iter().map(|run| run.point.clone())).take(POINTS).collect();
+        let mut random = self.random(0, 800);
+        let all: Vec<Confirmed> = points.iter().map(|point| self.confirm(point, &mut random)).collect();
+        let best = all.into_iter().min_by(|a, b| a.misfit(self).total_cmp(&b.misfit(self)))?;
+        if best.meets_all(self) || best.point.x.is_empty() {
+            return Some(best);
+        }
+        let found = self.search_by_means(&best);
+        Some(if found.misfit(self) < best.misfit(self) { found } else { best })
+    }
+
+    /// CMA-ES from a point on the distance of ensembles.
+    fn search_by_means(&self, from: &Confirmed) -> Confirmed {
+        let level = from.point.level;
+        let best = Mutex::new(from.clone());
+        let objective = |x: &DVector<f64>| {
+            let inside: Vec<f64> = x.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+            let outside: f64 = x.iter().zip(&inside).map(|(x, inside)| (x - inside).powi(2)).sum();
+            // The same perturbations at every point, whatever the order of threads.
+            let confirmed = self.confirm(&Point { level, x: inside }, &mut self.random(level, 801));
+            let misfit = confirmed.misfit(self);
+            let mut best = best.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let there = (misfit, &confirmed.point.x);
+            let here = (best.misfit(self), &best.point.x);
+            if there.0.total_cmp(&here.0).then_with(|| there.1.partial_cmp(here.1).unwrap_or(std::cmp::Ordering::Equal)).is_lt() {
+                *best = confirmed;
+            }
+            misfit + 100.0 * outside
+        };
+        let options = CMAESOptions::new(from.point.x.clone(), 0.08)
+            .population_size(POPULATION)
+            .max_generations(GENERATIONS)
+            .fun_target(0.5 * self.fitted.len() as f64)
+            .seed(self.seed);
+        if let Ok(mut search) = options.build(objective) {
+            search.run_parallel();
+        }
+        best.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
