@@ -14,6 +14,7 @@ pub(super) static FILE: File = File {
         experiment::MATERIAL,
         experiment::ROBOT,
         experiment::FRICTION,
+        experiment::MASS,
         MARKERS,
         NOISE,
         BENCH,
@@ -25,6 +26,8 @@ pub(super) static FILE: File = File {
         FREQUENCY_RESPONSE,
         STEADY,
         OBSERVATION,
+        IDENTIFY,
+        SEARCHED,
     ],
 };
 
@@ -231,5 +234,32 @@ pub(super) const OBSERVATION: Section = Section {
             Else("2 s on the planar engine in steps of 0.2 ms"),
             "the keys of [simulation] in an experiment file",
         ),
+        key(
+            "role",
+            Word(&["fit", "foretell"]),
+            Is("\"fit\""),
+            "with [identify]: constants are fitted to it, or it is foretold from the others",
+        ),
+    ],
+};
+
+pub(super) const IDENTIFY: Section = Section {
+    name: "identify",
+    heading: "[identify]",
+    about: "Constants that are identified from the [[observation]] tables: searched globally, then locally, with ranges, ties and predictions.",
+    keys: &[
+        key("seed", Other("a whole number from 0 on"), Is("0"), "seed of the search"),
+        key("vary", Other("a table"), Needed, "the constants: [identify.vary]"),
+    ],
+};
+
+pub(super) const SEARCHED: Section = Section {
+    name: "identify.vary.KEY",
+    heading: "\"KEY\" = { ... } of [identify.vary]",
+    about: "How one constant is searched: a key of an experiment file with dots and in quotes, as \"robot.friction.low\", or a parameter of an effect, as \"effect.stiffness.scale\". From and to, or values.",
+    keys: &[
+        key("from", Number(Any), Else("values"), "least value"),
+        key("to", Number(Any), Else("values"), "largest value"),
+        key("values", Numbers, Else("from and to"), "the only possible values"),
     ],
 };

@@ -60,10 +60,14 @@ fn the_tables_have_the_keys_that_the_parser_accepts_and_no_others() {
         "frequency_response",
         "steady",
         "observation",
+        "identify",
     ];
     assert_eq!(accepted::<Description>(""), tables.map(String::from).into());
     let sections: BTreeSet<_> = super::FILES[2].sections.iter().map(|section| section.name).collect();
-    assert_eq!(sections, tables.into_iter().chain(["robot.friction", "run.release"]).collect());
+    assert_eq!(
+        sections,
+        tables.into_iter().chain(["robot.friction", "robot.mass", "run.release", "identify.vary.KEY"]).collect()
+    );
     assert_eq!(listed(&dataset::DATASET), accepted::<crate::diagnose::dataset::About>(""));
     assert_eq!(listed(&dataset::BENCH), accepted::<crate::diagnose::dataset::Bench>(""));
     assert_eq!(listed(&dataset::RUN), accepted::<crate::diagnose::dataset::RunEntry>(""));
@@ -71,6 +75,8 @@ fn the_tables_have_the_keys_that_the_parser_accepts_and_no_others() {
     assert_eq!(listed(&dataset::COLUMNS), accepted::<crate::diagnose::dataset::Column>(""));
     assert_eq!(listed(&dataset::CAMERA), accepted::<crate::diagnose::dataset::Camera>(""));
     assert_eq!(listed(&dataset::FREQUENCY_RESPONSE), accepted::<crate::diagnose::dataset::ResponseEntry>(""));
+    assert_eq!(listed(&dataset::IDENTIFY), accepted::<crate::diagnose::identify::Identify>("vary = {}"));
+    assert_eq!(listed(&dataset::SEARCHED), accepted::<crate::diagnose::identify::Searched>(""));
     assert_eq!(listed(&dataset::OBSERVATION), accepted::<crate::diagnose::dataset::Observation>(""));
 }
 

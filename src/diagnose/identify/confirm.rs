@@ -20,9 +20,9 @@ const JITTER: f64 = 0.002;
 const POINTS: usize = 12;
 /// Distance (standard deviations) up to which a mean meets a number.
 const MET: f64 = 2.0;
-/// Generations of the search by means, and runs in one.
-const GENERATIONS: usize = 24;
+/// Points in a generation of the search by means, and simulations in all of its generations.
 const POPULATION: usize = 12;
+const MOST_RUNS: usize = 11_520;
 /// Distance of a number that most members do not give.
 const MISSING: f64 = 50.0;
 
@@ -106,7 +106,7 @@ impl Search<'_> {
         };
         let options = CMAESOptions::new(from.point.x.clone(), 0.08)
             .population_size(POPULATION)
-            .max_generations(GENERATIONS)
+            .max_generations(MOST_RUNS / (POPULATION * MEMBERS * self.fitted.len()))
             .fun_target(0.5 * self.fitted.len() as f64)
             .seed(self.seed);
         if let Ok(mut search) = options.build(objective) {

@@ -152,9 +152,10 @@ mod tests {
             assert!((high.x[at] - best.0[at] - half).abs() < 0.02 * half, "{high:?}");
             assert!((best.0[at] - low.x[at] - half).abs() < 0.02 * half && !low.is_edge && !high.is_edge);
         }
-        // With one of the two numbers the other combination is free: ranges end at the region.
+        // With one of the two numbers x₁ + x₂ = 1.1 is all that is known: x₁ reaches the region's end above, and below it what x₂ ≤ 1 leaves, 0.1 − 0.098.
         let one = Likelihood { without: Some(1), ..likelihood };
         let best = one.best([vec![0.6, 0.5]].into_iter()).unwrap();
-        assert!(one.range(&best, 0, RANGE).iter().all(|end| end.is_edge));
+        let [low, high] = one.range(&best, 0, RANGE);
+        assert!(high.is_edge && low.x[0] < 0.01, "{low:?} {high:?}");
     }
 }

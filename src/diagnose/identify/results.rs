@@ -9,10 +9,10 @@ use serde::Serialize;
 use super::super::DiagnoseError;
 use super::super::dataset::{Dataset, Observation};
 use super::super::observations::setting;
+use super::confirm::Confirmed;
 use super::constants::{self, Point};
 use super::emulator::Emulator;
 use super::profile::{Likelihood, RANGE};
-use super::confirm::Confirmed;
 use super::{Found, Run, Search};
 use crate::experiment::Spread;
 use crate::words::split_unit;
@@ -421,7 +421,8 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
         .map(|at| {
             let observation = search.fitted[at];
             let mean = confirmed.spreads[at].map_or_else(|| "nothing".into(), |spread| crate::number::fixed(spread.mean, 2));
-            let under = frequency(observation).map_or_else(|| setting(observation), |f| format!("{} Hz", crate::number::fixed(f, 1)));
+            let under =
+                frequency(observation).map_or_else(|| setting(observation), |f| format!("{} Hz", crate::number::fixed(f, 1)));
             format!("{} at {under} is {mean}, not {}", observation.measure, crate::number::fixed(observation.value, 2))
         })
         .collect();
@@ -430,7 +431,10 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
     let met = if missed.is_empty() {
         format!("A robot with {constants} meets every number: the means of eight runs lie within two standard deviations.")
     } else {
-        format!("No constants within the ranges were found that meet every number; closest comes {constants}, where {}.", missed.join("; "))
+        format!(
+            "No constants within the ranges were found that meet every number; closest comes {constants}, where {}.",
+            missed.join("; ")
+        )
     };
     let ranges = result.constants.iter().map(|c| {
         format!("{} = {} ({} to {})", c.key, told(&c.key, c.value), told(&c.key, c.range95[0]), told(&c.key, c.range95[1]))
