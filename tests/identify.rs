@@ -99,8 +99,8 @@ fn whatever_is_no_identification_is_refused_with_file_line_and_key() {
         (beam("damping = { from = 1, to = 2 }"), vec!["line 9", "damping", "table"]),
         (beam(good).replace("sigma =", "role = \"foretell\"\nsigma ="), vec!["identify", "nothing to fit"]),
         (
-            beam(good).replace("measure = \"resonance_hz\"", "measure = \"jump_height_mm\""),
-            vec!["observation 1", "jump_height_mm"],
+            beam(good).replace("\"tip_deflection_mm\"", "\"jump_height_mm\""),
+            vec!["observation 2", "jump_height_mm"],
         ),
         (beam(good).replacen("sigma =", "# sigma =", 1), vec!["sigma"]),
         (
