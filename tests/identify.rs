@@ -98,10 +98,7 @@ fn whatever_is_no_identification_is_refused_with_file_line_and_key() {
         ),
         (beam("damping = { from = 1, to = 2 }"), vec!["line 9", "damping", "table"]),
         (beam(good).replace("sigma =", "role = \"foretell\"\nsigma ="), vec!["identify", "nothing to fit"]),
-        (
-            beam(good).replace("\"tip_deflection_mm\"", "\"jump_height_mm\""),
-            vec!["observation 2", "jump_height_mm"],
-        ),
+        (beam(good).replace("\"tip_deflection_mm\"", "\"jump_height_mm\""), vec!["observation 2", "jump_height_mm"]),
         (beam(good).replacen("sigma =", "# sigma =", 1), vec!["sigma"]),
         (
             beam(good)
@@ -170,7 +167,9 @@ fn known_truth(folder: &Path, seed: u64) -> (String, Vec<(&'static str, f64)>) {
         ];
         let mut command = Command::new(env!("CARGO_BIN_EXE_sfers"));
         command.args(["run", &format!("preset:{preset}"), "--engine", "planar", "--json", "--quiet"]).current_dir(folder);
-        constants.chain(others).for_each(|setting| drop(command.args(["--set", &setting])));
+        for setting in constants.chain(others) {
+            command.args(["--set", &setting]);
+        }
         let output = command.output().unwrap();
         let run: Value = serde_json::from_slice(&output.stdout).unwrap();
         run["measures"][measure].as_f64().unwrap_or_else(|| panic!("{}", String::from_utf8_lossy(&output.stderr)))
