@@ -4,9 +4,9 @@
 //!
 //! 1. *Globally*: runs scattered over all ranges, then CMA-ES (Hansen and Ostermeier 2001) on a sum of ln(1 + r²/2σ²), which counts the numbers that are met and does not
 //!    care by how much others are missed: chaos may spoil some.
-//! 2. *Locally*, in waves: runs scattered over a region, [quadratic models](emulator) with the scatter about them, the region in which their
-//!    [likelihood](profile) is not negligible, again, until it shrinks no more (history matching; Craig et al. 1997).
-//! 3. The best points are [confirmed](confirm) by ensembles of runs.
+//! 2. *Locally*, in waves: runs scattered over a region, quadratic models with the scatter about them, the region in which their
+//!    likelihood is not negligible, again, until it shrinks no more (history matching; Craig et al. 1997).
+//! 3. The best points are confirmed by ensembles of runs.
 //! 4. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
 //!    of a similar measurement would be worth most.
 
