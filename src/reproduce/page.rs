@@ -16,7 +16,7 @@ pub fn page(effort: Effort, made_by: &str, results: &[(Study, Result<Findings, S
     let mut out = format!(
         "<h1>{title}</h1>\n<p>Zheng et al., “Scalable Simulation and Demonstration of Jumping Piezoelectric 2-D Soft Robots”, ICRA 2022, beside this \
          program. The numbers under “ours” are the planar engine's, to {} %: steps adapt until a tighter tolerance changes no more; some runs are repeated on Bullet, with its own column. No number was fitted \
-         to these results. Made by <code>{}</code>.</p>\n<nav>",
+         to these results, but for friction and damping of the study of speeds, which are chosen for its curve. Made by <code>{}</code>.</p>\n<nav>",
         100.0 * effort.step_error(),
         escape(made_by)
     );

@@ -127,7 +127,7 @@ fn compare(findings: &mut Findings, curves: &[Curve]) {
         "3 Hz (measured)",
         told(&|curve| format!("{} Hz", fixed(curve.forward_to(), 0))),
         told(&|curve| format!("{} Hz", signed(curve.forward_to() - FORWARD_TO_HZ, 0))),
-        "At 4 and 5 Hz the simulated speeds are small and of either sign.",
+        "From 4 to 7 Hz the simulated speeds change their sign from one frequency to the next.",
     );
     for (quantity, (f, speed), explanation) in [
         (
