@@ -22,11 +22,13 @@ fn curves(text: &str) -> BTreeMap<(String, String), Vec<f64>> {
     curves
 }
 
+/// The constants were chosen with the perturbations of the preset's seed; those here are others.
 #[test]
 #[ignore = "slow: run by scripts/test.sh"]
 fn the_published_signs_and_places_come_out_for_two_chains_at_two_steps() {
     let folder = tempfile::tempdir().unwrap();
-    let output = sfers(folder.path(), &["sweep", "preset:published-speeds-scan", "--out", "s", "--quiet"]);
+    let output =
+        sfers(folder.path(), &["sweep", "preset:published-speeds-scan", "--out", "s", "--quiet", "--set", "ensemble.seed=2"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let curves = curves(&fs::read_to_string(folder.path().join("s/results.csv")).unwrap());
     assert_eq!(curves.len(), 4);

@@ -309,7 +309,7 @@ impl Robot {
             self.extensions.clamp_hardening,
             "0 beside a clamp whose turn is a curve",
         )?;
-        let length = self.segments().iter().map(|segment| segment.length).sum::<f64>();
+        let length = self.material.actuator_length * self.actuators as f64;
         for point in &self.masses {
             let (mass, position) = (point.mass, point.position);
             ModelError::unless(mass.is_finite() && mass >= 0.0, "robot.mass.mass_g", mass, "zero or more")?;

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::constants::Point;
-use super::{Run, Search};
+use super::{MISSING, POPULATION, Run, Search, clamped};
 use crate::experiment::Spread;
 
 /// Members of an ensemble, and the standard deviation of their coordinates.
@@ -20,11 +20,8 @@ const JITTER: f64 = 0.002;
 const POINTS: usize = 12;
 /// Distance (standard deviations) up to which a mean meets a number.
 const MET: f64 = 2.0;
-/// Points in a generation of the search by means, and simulations in all of its generations.
-const POPULATION: usize = 12;
+/// Most simulations of the search by means.
 const MOST_RUNS: usize = 11_520;
-/// Distance of a number that most members do not give.
-const MISSING: f64 = 50.0;
 
 /// A point with the spread of every fitted number over its ensemble.
 #[derive(Debug, Clone)]
@@ -91,8 +88,7 @@ impl Search<'_> {
         let level = from.point.level;
         let best = Mutex::new(from.clone());
         let objective = |x: &DVector<f64>| {
-            let inside: Vec<f64> = x.iter().map(|x| x.clamp(0.0, 1.0)).collect();
-            let outside: f64 = x.iter().zip(&inside).map(|(x, inside)| (x - inside).powi(2)).sum();
+            let (inside, penalty) = clamped(x.as_slice());
             // The same perturbations at every point, whatever the order of threads.
             let confirmed = self.confirm(&Point { level, x: inside }, &mut self.random(level, 801));
             let misfit = confirmed.misfit(self);
@@ -102,7 +98,7 @@ impl Search<'_> {
             if there.0.total_cmp(&here.0).then_with(|| there.1.partial_cmp(here.1).unwrap_or(std::cmp::Ordering::Equal)).is_lt() {
                 *best = confirmed;
             }
-            misfit + 100.0 * outside
+            misfit + penalty
         };
         let options = CMAESOptions::new(from.point.x.clone(), 0.08)
             .population_size(POPULATION)

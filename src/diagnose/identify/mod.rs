@@ -83,6 +83,15 @@ struct Found {
     level: usize,
     emulator: Emulator,
     best: (Vec<f64>, f64),
+    /// False if the region still changed in the last wave.
+    is_settled: bool,
+}
+
+/// Coordinates of a search without bounds within 0 to 1, and what is added to its objective for those beyond.
+fn clamped(x: &[f64]) -> (Vec<f64>, f64) {
+    let inside: Vec<f64> = x.iter().map(|x| x.clamp(0.0, 1.0)).collect();
+    let outside: f64 = x.iter().zip(&inside).map(|(x, inside)| (x - inside).powi(2)).sum();
+    (inside, 100.0 * outside)
 }
 
 /// Identifies the constants of `[identify]` from the data set's observations.
@@ -149,10 +158,9 @@ impl Search<'_> {
         let start = best.map_or_else(|| vec![0.5; constants], |run| run.point.x.clone());
         let seen = Mutex::new(Vec::new());
         let objective = |x: &DVector<f64>| {
-            let inside: Vec<f64> = x.iter().map(|x| x.clamp(0.0, 1.0)).collect();
-            let outside: f64 = x.iter().zip(&inside).map(|(x, inside)| (x - inside).powi(2)).sum();
+            let (inside, penalty) = clamped(x.as_slice());
             let run = self.evaluate(vec![Point { level, x: inside }]).remove(0);
-            let score = self.score(&run.values) + 100.0 * outside;
+            let score = self.score(&run.values) + penalty;
             seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(run);
             score
         };
@@ -201,7 +209,7 @@ impl Search<'_> {
                 }
             }
             let is_settled = !is_wider && next.volume() > SETTLED * region.volume();
-            found = Some(Found { level, emulator: emulator.clone(), best });
+            found = Some(Found { level, emulator, best, is_settled });
             if is_settled || constants == 0 {
                 break;
             }

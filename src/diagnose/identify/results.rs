@@ -207,6 +207,9 @@ pub(super) fn results(
     let space = search.space;
     let possible: Vec<&Found> = found.iter().filter(|found| found.best.1 <= best.best.1 + RANGE).collect();
     let mut remarks = Vec::new();
+    if possible.iter().any(|found| !found.is_settled) {
+        remarks.push("the region of likely constants still changed in the last wave: ranges are not converged".into());
+    }
     let (constants, corners) = constants_of(search, best, &possible);
     let listed = space.listed.iter().enumerate().map(|(at, key)| {
         let of = |found: &&Found| space.levels[found.level][at];
