@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::long::long;
 use common::random::Random;
 use sfers::crosscheck::{self, EngineVerdict};
 use sfers::experiment::{self, Source};
@@ -42,7 +43,7 @@ fn random(case: usize) -> String {
 #[test]
 #[ignore = "slow: run by scripts/test.sh"]
 fn robots_on_films_walk_as_on_bullet() {
-    let count = if std::env::var("SFERS_LONG").is_ok_and(|long| long == "1") { 40 } else { 1 };
+    let count = if long() { 40 } else { 1 };
     let (mut agree, mut differ) = (0, 0_usize);
     for case in 0..count {
         let text = random(case);

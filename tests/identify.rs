@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use common::long::long;
 use common::sfers;
 use serde_json::Value;
 use sfers::analytic::cantilever_frequency;
@@ -200,7 +201,7 @@ fn known_truth(folder: &Path, seed: u64) -> (String, Vec<(&'static str, f64)>) {
 #[test]
 #[ignore = "slow: run by scripts/test.sh"]
 fn known_truths_lie_in_their_ranges_and_left_out_speeds_have_their_signs() {
-    let seeds = if std::env::var_os("SFERS_LONG").is_some() { 101..=120 } else { 101..=101 };
+    let seeds = if long() { 101..=120 } else { 101..=101 };
     let many = seeds.clone().count() > 1;
     let [mut inside, mut values, mut signs, mut speeds] = [0; 4];
     for seed in seeds {

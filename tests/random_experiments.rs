@@ -8,6 +8,7 @@ mod common;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use common::long::long;
 use common::random::Random;
 use sfers::experiment::{self, Control, Experiment, Source};
 
@@ -105,7 +106,7 @@ fn try_case(case: usize) -> (Outcome, String) {
 
 #[test]
 fn an_automatic_step_keeps_its_promise_on_robots_nobody_chose() {
-    let by_default = if std::env::var("SFERS_LONG").is_ok_and(|long| long == "1") { 200 } else { 6 };
+    let by_default = if long() { 200 } else { 6 };
     let count: usize = std::env::var("SFERS_RANDOM_EXPERIMENTS").map_or(by_default, |count| count.parse().unwrap());
     let next = AtomicUsize::new(0);
     let outcomes = Mutex::new(Vec::new());

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every user takes a part of it
 
+pub mod long;
 pub mod pages;
 pub mod random;
 pub mod tools;

@@ -2,8 +2,12 @@
 
 #![allow(dead_code)] // every user takes a part of it
 
+#[path = "../common/long.rs"]
+mod long;
+
 use std::path::Path;
 
+pub use long::long;
 use sfers::diagnose::dataset::Dataset;
 use sfers::diagnose::diagnosis::{Adopted, Diagnosis, Part, Verdict};
 use sfers::diagnose::pipeline::{Outcome, diagnose};
@@ -59,9 +63,4 @@ pub fn range(d: &Diagnosis, hidden: &str, parameter: &str) -> Option<[f64; 2]> {
 /// True if it holds the true value.
 pub fn holds(d: &Diagnosis, hidden: &str, parameter: &str, value: f64) -> Option<bool> {
     range(d, hidden, parameter).map(|[low, high]| low <= value && value <= high)
-}
-
-/// True for every effect instead of a sample: `scripts/test.sh --hidden`.
-pub fn long() -> bool {
-    std::env::var("SFERS_LONG").is_ok_and(|value| value == "1")
 }
