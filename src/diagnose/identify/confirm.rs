@@ -71,7 +71,8 @@ impl Search<'_> {
     /// The point whose ensemble is closest to the numbers: one of the `likely`, of the best `runs`, or of a search from there.
     pub(super) fn confirmed(&self, likely: impl Iterator<Item = Point>, runs: &[Run]) -> Option<Confirmed> {
         let mut sorted: Vec<&Run> = runs.iter().collect();
-        sorted.sort_by(|a, b| self.score(&a.values).total_cmp(&self.score(&b.values)));
+        let score = |run: &Run| Search::score(&self.observed, &run.values);
+        sorted.sort_by(|a, b| score(a).total_cmp(&score(b)));
         let points: Vec<Point> = likely.chain(sorted.iter().map(|run| run.point.clone())).take(POINTS).collect();
         let mut random = self.random(0, 800);
         let all: Vec<Confirmed> = points.iter().map(|point| self.confirm(point, &mut random)).collect();

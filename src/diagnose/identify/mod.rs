@@ -2,12 +2,15 @@
 //!
 //! The path, for every combination of the constants that have only some values:
 //!
-//! 1. *Globally*: runs scattered over all ranges, then CMA-ES (Hansen and Ostermeier 2001) on a sum of ln(1 + r²/2σ²), which counts the numbers that are met and does not
-//!    care by how much others are missed: chaos may spoil some.
-//! 2. *Locally*, in waves: runs scattered over a region, quadratic models with the scatter about them, the region in which their
-//!    likelihood is not negligible, again, until it shrinks no more (history matching; Craig et al. 1997).
-//! 3. The best points are confirmed by ensembles of runs.
-//! 4. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
+//! 1. *Globally*: runs scattered over all ranges, then CMA-ES (Hansen and Ostermeier 2001) on a sum of ln(1 + r²/2s²), which counts the numbers that are met and does not
+//!    care by how much others are missed: chaos may spoil some. s is the number's standard deviation and a fifth of the rms of its measure: with the first alone the sum is
+//!    rugged, for small speeds are known to small errors, and all but the right constants miss them by far.
+//! 2. *Locally*, in waves: runs scattered over a region, quadratic models with the scatter about them, the region in which their likelihood is not negligible, again,
+//!    until it shrinks no more (history matching; Craig et al. 1997). While even the best misses the numbers, χ² per degree of freedom above one, less is excluded
+//!    by that factor.
+//! 3. If the best misses the numbers by more than noise does once in a thousand, the basin was wrong: both again, CMA-ES from elsewhere. If it still does, there are no ranges.
+//! 4. The best points are confirmed by ensembles of runs.
+//! 5. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
 //!    of a similar measurement would be worth most.
 
 mod confirm;
@@ -38,23 +41,34 @@ use self::profile::Likelihood;
 use self::region::Region;
 use super::DiagnoseError;
 use super::dataset::{Dataset, Observation};
+use super::residual_tests::chi2_limit;
 use crate::experiment::Config;
 
 /// Scattered runs per constant and one more, of every combination.
 const SCATTERED: usize = 24;
 /// Runs in a generation of CMA-ES, and generations.
 const POPULATION: usize = 12;
-const GENERATIONS: usize = 16;
+const GENERATIONS: usize = 12;
+/// Searches at most, each from another start.
+const SEARCHES: u64 = 3;
+/// Starts of CMA-ES differ by this much in one coordinate at least: twice its first standard deviation.
+const APART: f64 = 0.3;
+/// First standard deviation of CMA-ES.
+const FIRST_STEP: f64 = 0.15;
 /// Combinations go on whose best point is this much above the best of all.
 const HOPEFUL: f64 = 8.0;
 /// Points up to this much above the best of a combination make its first region.
-const NEAR: f64 = 5.0;
+const NEAR: f64 = 3.0;
+/// Share of a measure's rms that the search everywhere adds to the standard deviations.
+const COARSE: f64 = 0.2;
 /// Rise of −2 ln L at the edge of the next region: five standard deviations of a single constant.
 const KEPT: f64 = 25.0;
 /// Runs per coefficient of the quadratic models in a wave, at least so many in all, and waves at most.
 const RUNS_PER_COEFFICIENT: usize = 8;
 const LEAST_RUNS: usize = 90;
-const WAVES: usize = 7;
+const WAVES: u64 = 10;
+/// Waves after which a combination is left that misses the numbers where another one meets them.
+const TRIALS: u64 = 3;
 /// A region that shrinks to no less than this share is the last.
 const SETTLED: f64 = 0.7;
 /// Residual (σ) of a number that no run gives.
@@ -75,6 +89,8 @@ struct Search<'a> {
     fitted: Vec<&'a Observation>,
     /// Their values and standard deviations.
     observed: Vec<(f64, f64)>,
+    /// The same, with the standard deviations of the search everywhere.
+    coarse: Vec<(f64, f64)>,
     seed: u64,
 }
 
@@ -82,6 +98,7 @@ struct Search<'a> {
 struct Found {
     level: usize,
     emulator: Emulator,
+    /// The likeliest coordinates, and −2 ln L there.
     best: (Vec<f64>, f64),
     /// False if the region still changed in the last wave.
     is_settled: bool,
@@ -102,22 +119,41 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
     let Some((identify, space)) = &dataset.identify else { return Err("the data set has no [identify]".into()) };
     let fitted: Vec<&Observation> = dataset.observations.iter().filter(|observation| !observation.is_foretold()).collect();
     let observed = fitted.iter().map(|observation| (observation.value, observation.sigma)).collect();
-    let search = Search { nominal: &dataset.nominal, space, fitted, observed, seed: identify.seed };
+    let coarse = |observation: &&Observation| {
+        let alike: Vec<f64> =
+            fitted.iter().filter(|other| other.measure == observation.measure).map(|other| other.value).collect();
+        let rms = (alike.iter().map(|value| value * value).sum::<f64>() / alike.len() as f64).sqrt();
+        (observation.value, observation.sigma.hypot(COARSE * rms))
+    };
+    let coarse = fitted.iter().map(coarse).collect();
+    let search = Search { nominal: &dataset.nominal, space, fitted, observed, coarse, seed: identify.seed };
     let mut runs = Vec::new();
-    let mut scores = Vec::new();
-    for level in 0..space.levels.len() {
-        progress(&format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
-        let found = search.everywhere(level);
-        scores.push(found.iter().map(|run| search.score(&run.values)).fold(f64::INFINITY, f64::min));
-        runs.extend(found);
+    let mut found: Vec<Found> = Vec::new();
+    let mut starts = Vec::new();
+    for at in 0..SEARCHES {
+        let mut hopeful = Vec::new();
+        for level in 0..space.levels.len() {
+            progress(&format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
+            let first = runs.len();
+            search.everywhere(level, at, &mut runs, &mut starts);
+            let scores: Vec<f64> = runs[first..].iter().map(|run| search.coarse_score(run)).collect();
+            let best = scores.iter().copied().fold(f64::INFINITY, f64::min);
+            let near = runs[first..].iter().zip(&scores).filter(|(_, score)| **score <= best + NEAR);
+            hopeful.extend(Region::around(near.map(|(run, _)| &run.point.x[..]), 0.1, 0.06).map(|region| (best, level, region)));
+        }
+        let best = runs.iter().map(|run| search.coarse_score(run)).fold(f64::INFINITY, f64::min);
+        hopeful.retain(|(score, ..)| *score <= best + HOPEFUL);
+        hopeful.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, level, region) in hopeful {
+            let is_met = found.iter().any(|found| search.is_met(found));
+            found.extend(search.closely(level, at, region, is_met, &mut runs, progress));
+        }
+        found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
+        if space.constants.is_empty() || found.first().is_some_and(|best| search.is_met(best)) {
+            break;
+        }
     }
-    let best = scores.iter().copied().fold(f64::INFINITY, f64::min);
-    let hopeful: Vec<usize> = (0..scores.len()).filter(|level| scores[*level] <= best + HOPEFUL).collect();
-    let mut found = Vec::new();
-    for level in hopeful {
-        found.extend(search.closely(level, scores[level], &mut runs, progress));
-    }
-    results::results(&search, dataset, found, &runs, progress)
+    results::results(&search, dataset, &found, &runs, progress)
 }
 
 impl Search<'_> {
@@ -131,13 +167,31 @@ impl Search<'_> {
         points.into_par_iter().with_max_len(1).map(run).collect()
     }
 
-    /// Σ ln(1 + r²/2), r the residual over σ.
-    fn score(&self, values: &[Option<f64>]) -> f64 {
+    /// Σ ln(1 + r²/2), r the residual over the standard deviation of the `numbers`.
+    fn score(numbers: &[(f64, f64)], values: &[Option<f64>]) -> f64 {
         let of = |(predicted, (value, sigma)): (&Option<f64>, &(f64, f64))| {
             let residual = predicted.map_or(MISSING, |predicted| (predicted - value) / sigma);
             (0.5 * residual * residual).ln_1p()
         };
-        values.iter().zip(&self.observed).map(of).sum()
+        values.iter().zip(numbers).map(of).sum()
+    }
+
+    fn coarse_score(&self, run: &Run) -> f64 {
+        Self::score(&self.coarse, &run.values)
+    }
+
+    /// χ² per degree of freedom, and the degrees.
+    fn reduced_chi2(&self, emulator: &Emulator, x: &[f64]) -> (f64, f64) {
+        let likelihood = Likelihood { emulator, observed: &self.observed, without: None };
+        let (chi2, count) = likelihood.chi2(x);
+        let freedom = count.saturating_sub(self.space.constants.len()).max(1) as f64;
+        (chi2 / freedom, freedom)
+    }
+
+    /// Whether what was found meets the numbers but for noise and scatter.
+    fn is_met(&self, found: &Found) -> bool {
+        let (chi2, freedom) = self.reduced_chi2(&found.emulator, &found.best.0);
+        chi2 <= chi2_limit(freedom)
     }
 
     fn random(&self, level: usize, stage: u64) -> ChaCha8Rng {
@@ -146,25 +200,33 @@ impl Search<'_> {
         random
     }
 
-    /// Runs scattered over all ranges, and those of CMA-ES from the best of them.
-    fn everywhere(&self, level: usize) -> Vec<Run> {
+    /// Adds runs scattered over all ranges, and those of CMA-ES from the best run that is apart from all `starts`.
+    fn everywhere(&self, level: usize, search: u64, runs: &mut Vec<Run>, starts: &mut Vec<Point>) {
         let constants = self.space.constants.len();
         if constants == 0 {
-            return self.evaluate(vec![Point { level, x: Vec::new() }]);
+            return runs.extend(self.evaluate(vec![Point { level, x: Vec::new() }]));
         }
-        let scattered = Region::whole(constants).scattered(SCATTERED * (constants + 1), &mut self.random(level, 0));
-        let mut runs = self.evaluate(scattered.into_iter().map(|x| Point { level, x }).collect());
-        let best = runs.iter().min_by(|a, b| self.score(&a.values).total_cmp(&self.score(&b.values)));
-        let start = best.map_or_else(|| vec![0.5; constants], |run| run.point.x.clone());
+        let mut random = self.random(level, 100 * search);
+        let scattered = Region::whole(constants).scattered(SCATTERED * (constants + 1), &mut random);
+        runs.extend(self.evaluate(scattered.into_iter().map(|x| Point { level, x }).collect()));
+        let is_apart = |x: &[f64], start: &Point| x.iter().zip(&start.x).any(|(a, b)| (a - b).abs() > APART);
+        let is_free = |run: &&Run| {
+            run.point.level == level && starts.iter().all(|start| start.level != level || is_apart(&run.point.x, start))
+        };
+        let by_score = |a: &&Run, b: &&Run| self.coarse_score(a).total_cmp(&self.coarse_score(b));
+        let Some(start) = runs.iter().filter(is_free).min_by(by_score).map(|run| run.point.clone()) else { return };
         let seen = Mutex::new(Vec::new());
         let objective = |x: &DVector<f64>| {
             let (inside, penalty) = clamped(x.as_slice());
             let run = self.evaluate(vec![Point { level, x: inside }]).remove(0);
-            let score = self.score(&run.values) + penalty;
+            let score = self.coarse_score(&run) + penalty;
             seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(run);
             score
         };
-        let options = CMAESOptions::new(start, 0.15).population_size(POPULATION).max_generations(GENERATIONS).seed(self.seed);
+        let options = CMAESOptions::new(start.x.clone(), FIRST_STEP)
+            .population_size(POPULATION)
+            .max_generations(GENERATIONS)
+            .seed(self.seed);
         if let Ok(mut search) = options.build(objective) {
             search.run_parallel();
         }
@@ -172,21 +234,30 @@ impl Search<'_> {
         // In an order that does not depend on threads.
         let compare = |a: &Run, b: &Run| a.point.x.iter().zip(&b.point.x).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
         seen.sort_by(|a, b| compare(a, b).unwrap_or(std::cmp::Ordering::Equal));
+        starts.push(start);
+        starts.extend(seen.iter().min_by(by_score).map(|run| run.point.clone()));
         runs.extend(seen);
-        runs
     }
 
-    /// Waves of runs in ever smaller regions around the likely points; `None` if they give no measures.
-    fn closely(&self, level: usize, best: f64, runs: &mut Vec<Run>, progress: &(dyn Fn(&str) + Sync)) -> Option<Found> {
+    /// Waves of runs in ever smaller regions around the likely points, at most a few if they miss the numbers and another combination meets them; `None` if they
+    /// give no measures.
+    fn closely(
+        &self,
+        level: usize,
+        search: u64,
+        mut region: Region,
+        is_met_elsewhere: bool,
+        runs: &mut Vec<Run>,
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Option<Found> {
         let constants = self.space.constants.len();
-        let near = |run: &&Run| run.point.level == level && self.score(&run.values) <= best + NEAR;
-        let mut region = Region::around(runs.iter().filter(near).map(|run| &run.point.x[..]), 0.1, 0.06)?;
         let mut found = None;
         for wave in 1..=WAVES {
             progress(&format!("wave {wave} around the best, {} runs so far", runs.len()));
             let count = LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants));
             let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
-            let fresh = region.scattered(count.saturating_sub(inside).max(count / 2), &mut self.random(level, wave as u64));
+            let fresh =
+                region.scattered(count.saturating_sub(inside).max(count / 2), &mut self.random(level, 100 * search + wave));
             runs.extend(self.evaluate(fresh.into_iter().map(|x| Point { level, x }).collect()));
             let own = || runs.iter().filter(|run| run.point.level == level);
             let emulator = Emulator::fit(region.clone(), own().map(|run| (&run.point.x[..], &run.values[..])), self.fitted.len());
@@ -195,7 +266,8 @@ impl Search<'_> {
             let mut starts: Vec<&Run> = own().filter(|run| region.holds(&run.point.x)).collect();
             starts.sort_by(|a, b| likelihood.misfit(&a.point.x).total_cmp(&likelihood.misfit(&b.point.x)));
             let best = likelihood.best(starts.iter().take(6).map(|run| run.point.x.clone()))?;
-            let ends: Vec<_> = (0..constants).flat_map(|at| likelihood.range(&best, at, KEPT)).collect();
+            let kept = KEPT * self.reduced_chi2(&emulator, &best.0).0.max(1.0);
+            let ends: Vec<_> = (0..constants).flat_map(|at| likelihood.range(&best, at, kept)).collect();
             let mut next = Region::around(ends.iter().map(|end| &end.x[..]), 0.1, 0.0)?;
             let mut is_wider = false;
             for (at, pair) in ends.chunks_exact(2).enumerate() {
@@ -209,8 +281,10 @@ impl Search<'_> {
                 }
             }
             let is_settled = !is_wider && next.volume() > SETTLED * region.volume();
-            found = Some(Found { level, emulator, best, is_settled });
-            if is_settled || constants == 0 {
+            let there = Found { level, emulator, best, is_settled };
+            let is_left = is_met_elsewhere && wave >= TRIALS && !self.is_met(&there);
+            found = Some(there);
+            if is_settled || is_left || constants == 0 {
                 break;
             }
             region = next;

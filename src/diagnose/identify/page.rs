@@ -12,7 +12,10 @@ pub fn page(found: &Identification, command: &str) -> String {
     let mut table = Table::new(&["constant", "#best", "#95 % from", "#to", "tied with (correlation)"]).stacking();
     for c in &found.constants {
         let tied = c.tied_with.iter().map(|(key, r)| format!("{key} ({})", signed(*r, 2))).collect::<Vec<_>>().join(", ");
-        let end = |at: usize| Cell::from(told(&c.key, c.range95[at])).bad_if(c.at_bound[at]);
+        let end = |at: usize| match c.range95 {
+            Some(range) => Cell::from(told(&c.key, range[at])).bad_if(c.at_bound[at]),
+            None => "–".into(),
+        };
         table.row([c.key.as_str().into(), told(&c.key, c.value).into(), end(0), end(1), tied.into()]);
     }
     for c in &found.listed {
@@ -68,13 +71,15 @@ pub fn page(found: &Identification, command: &str) -> String {
          widen without the number.</p>\n",
     );
     out.push_str(&curves(found));
-    out.push_str("<h2>Corners</h2>\n");
-    let mut table = Table::new(&["at the", "constants"]);
-    for corner in &found.corners {
-        let values = corner.values.iter().map(|(key, value)| format!("{key} = {}", told(key, *value))).collect::<Vec<_>>();
-        table.row([corner.of.as_str().into(), values.join(", ").into()]);
+    if !found.corners.is_empty() {
+        out.push_str("<h2>Corners</h2>\n");
+        let mut table = Table::new(&["at the", "constants"]);
+        for corner in &found.corners {
+            let values = corner.values.iter().map(|(key, value)| format!("{key} = {}", told(key, *value))).collect::<Vec<_>>();
+            table.row([corner.of.as_str().into(), values.join(", ").into()]);
+        }
+        out.push_str(&table.html());
     }
-    out.push_str(&table.html());
     if !found.next.is_empty() {
         out.push_str("<h2>What to measure next</h2>\n");
         let mut table = Table::new(&["measure", "#at (Hz)", "#uncertain by", "#scatter"]);
@@ -102,7 +107,6 @@ pub fn page(found: &Identification, command: &str) -> String {
 /// For each measure with three frequencies or more a figure of measured and predicted values.
 fn curves(found: &Identification) -> String {
     let mut measures: Vec<&str> = found.facts.iter().map(|fact| fact.measure.as_str()).collect();
-    measures.dedup();
     measures.sort_unstable();
     measures.dedup();
     let mut out = String::new();

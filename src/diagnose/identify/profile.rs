@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::MISSING;
 use super::emulator::Emulator;
 
 /// Rise of −2 ln L at the ends of a 95 % range of one constant: the quantile of χ² with one degree of freedom.
@@ -41,9 +42,18 @@ impl Likelihood<'_> {
         counted.filter_map(residual).collect()
     }
 
-    /// −2 ln L.
+    /// −2 ln L. A number that no model gives counts as missed by far, so that regions with and without it can be compared.
     pub fn misfit(&self, x: &[f64]) -> f64 {
-        self.residuals(x).iter().map(|(residual, _, variance)| residual * residual + variance.ln()).sum()
+        let given = self.residuals(x).iter().map(|(residual, _, variance)| residual * residual + variance.ln()).sum::<f64>();
+        let numbers = self.emulator.surfaces.iter().zip(self.observed).enumerate();
+        let missing = numbers.filter(|(at, (surface, _))| surface.is_none() && Some(*at) != self.without);
+        given + missing.map(|(_, (_, (_, sigma)))| MISSING * MISSING + 2.0 * sigma.ln()).sum::<f64>()
+    }
+
+    /// The sum of squared residuals over their variances, and their number.
+    pub fn chi2(&self, x: &[f64]) -> (f64, usize) {
+        let residuals = self.residuals(x);
+        (residuals.iter().map(|(residual, ..)| residual * residual).sum(), residuals.len())
     }
 
     /// Half the Hessian of −2 ln L by Gauss's approximation: the information matrix.

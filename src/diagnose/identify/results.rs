@@ -69,8 +69,8 @@ pub struct Identified {
     pub key: String,
     /// Its best value.
     pub value: f64,
-    /// Its 95 % range by the profile likelihood.
-    pub range95: [f64; 2],
+    /// Its 95 % range by the profile likelihood; none if the best constants miss the numbers by more than noise.
+    pub range95: Option<[f64; 2]>,
     /// Whether an end of that is one of the search.
     pub at_bound: [bool; 2],
     /// Other constants with a correlation of 0.9 or more, with it.
@@ -84,7 +84,7 @@ pub struct Listed {
     pub key: String,
     /// Its best value.
     pub value: f64,
-    /// All that are possible at 95 %.
+    /// All that are possible at 95 %; none where there are no ranges either.
     pub possible: Vec<f64>,
 }
 
@@ -196,11 +196,10 @@ impl<'a> Likely<'a> {
 pub(super) fn results(
     search: &Search,
     dataset: &Dataset,
-    mut found: Vec<Found>,
+    found: &[Found],
     runs: &[Run],
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Identification, DiagnoseError> {
-    found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
     let Some(best) = found.first() else {
         return Err("no constants within the ranges give the measured numbers: every run fails, or most of them; widen [identify.vary], or simulate longer".into());
     };
@@ -210,12 +209,20 @@ pub(super) fn results(
     if possible.iter().any(|found| !found.is_settled) {
         remarks.push("the region of likely constants still changed in the last wave: ranges are not converged".into());
     }
-    let (constants, corners) = constants_of(search, best, &possible);
+    let is_met = search.is_met(best);
+    let (mut constants, mut corners) = constants_of(search, best, &possible);
+    if !is_met {
+        constants.iter_mut().for_each(|constant| (constant.range95, constant.at_bound) = (None, [false; 2]));
+        corners.clear();
+    }
     let listed = space.listed.iter().enumerate().map(|(at, key)| {
         let of = |found: &&Found| space.levels[found.level][at];
         let mut values: Vec<f64> = possible.iter().map(of).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
+        if !is_met {
+            values.clear();
+        }
         Listed { key: key.clone(), value: space.levels[best.level][at], possible: values }
     });
     let likely = Likely::new(search, best, None).ok_or("the information matrix cannot be inverted")?;
@@ -292,7 +299,7 @@ fn constants_of(search: &Search, best: &Found, possible: &[&Found]) -> (Vec<Iden
         constants.push(Identified {
             key: constant.key.clone(),
             value: constant.value(best.best.0[at]),
-            range95: range.map(|x| constant.value(x)),
+            range95: Some(range.map(|x| constant.value(x))),
             at_bound: [range[0] <= 1e-6, range[1] >= 1.0 - 1e-6],
             tied_with: tied_with.filter(|(_, correlation)| correlation.abs() >= TIED).collect(),
         });
@@ -439,14 +446,24 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
             missed.join("; ")
         )
     };
-    let ranges = result.constants.iter().map(|c| {
-        format!("{} = {} ({} to {})", c.key, told(&c.key, c.value), told(&c.key, c.range95[0]), told(&c.key, c.range95[1]))
+    let ranges = result.constants.iter().filter_map(|c| {
+        let [low, high] = c.range95?.map(|end| told(&c.key, end));
+        Some(format!("{} = {} ({low} to {high})", c.key, told(&c.key, c.value)))
     });
     let listed = result.listed.iter().map(|c| {
         let possible = c.possible.iter().map(|value| told(&c.key, *value)).collect::<Vec<_>>().join(" or ");
         format!("{} = {possible}", c.key)
     });
     let values = ranges.chain(listed).collect::<Vec<_>>().join(", ");
+    let values = if result.constants.iter().any(|c| c.range95.is_none()) {
+        format!(
+            "The best are off by {} standard deviations rms, more than noise and scatter explain: there are no 95 % ranges. The standard deviations are too small, the ranges \
+             of the search leave the robot out, or the model lacks something.",
+            crate::number::fixed(result.misfit_sigma, 1)
+        )
+    } else {
+        format!("95 % ranges: {values}.")
+    };
     let set = match (fewer, result.is_set) {
         (true, _) => " There are fewer numbers than constants: the answer is a set, of which the corners are listed.",
         (false, true) => {
@@ -454,5 +471,5 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
         }
         _ => "",
     };
-    format!("{met} 95 % ranges: {values}.{set}")
+    format!("{met} {values}{set}")
 }
