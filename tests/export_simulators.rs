@@ -67,35 +67,40 @@ fn pybullet_loads_the_same_robot_from_the_urdf() {
     }
 }
 
+/// The cantilever as it is, and with a payload near its end.
 #[test]
 fn mujoco_loads_urdf_and_mjcf_and_its_cantilever_bends_and_rings_alike() {
     let test = "mujoco_loads_urdf_and_mjcf_and_its_cantilever_bends_and_rings_alike";
     let Some(python) = tools::python(test, &["mujoco", "numpy"]) else { return };
     let folder = tempfile::tempdir().unwrap();
-    let settings = ["simulation.time_step_s=4e-6", "simulation.duration_s=0.5"];
-    let statics = from_preset("cantilever-dc", &settings);
-    let ringing = from_preset("cantilever-step", &[settings[0], settings[1], "robot.damping_eta=0.03"]);
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    std::fs::write(path("a.urdf"), export::urdf(&ringing, "test")).unwrap();
-    std::fs::write(path("a.json"), export::sidecar(&ringing, "test").to_string()).unwrap();
-    std::fs::write(path("a.xml"), export::mjcf(&ringing, "test")).unwrap();
-    let answer = script(&python, "export_mujoco.py", &[&path("a.urdf"), &path("a.xml"), &path("a.json"), "-1000", "-1500"], "");
+    for (payload, payload_g) in [("robot.mass=[]", 0.0), ("robot.mass=[{ position_mm = 90, mass_g = 0.2 }]", 0.2)] {
+        let settings = ["simulation.time_step_s=4e-6", "simulation.duration_s=0.5", payload];
+        let statics = from_preset("cantilever-dc", &settings);
+        let ringing = from_preset("cantilever-step", &[&settings[..], &["robot.damping_eta=0.03"]].concat());
+        let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        std::fs::write(path("a.urdf"), export::urdf(&ringing, "test")).unwrap();
+        std::fs::write(path("a.json"), export::sidecar(&ringing, "test").to_string()).unwrap();
+        std::fs::write(path("a.xml"), export::mjcf(&ringing, "test")).unwrap();
+        let arguments = [&path("a.urdf"), &path("a.xml"), &path("a.json"), "-1000", "-1500"];
+        let answer = script(&python, "export_mujoco.py", &arguments, "");
 
-    let mass: f64 = ringing.robot.segments().iter().map(|segment| segment.mass).sum();
-    assert_eq!(answer["mjcf_joints"], 3);
-    assert!((answer["mjcf_mass"].as_f64().unwrap() / mass - 1.0).abs() < 1e-9, "{answer}");
-    // In a URDF the base is part of the world for MuJoCo: its mass does not count.
-    assert_eq!(answer["urdf_joints"], 3);
-    assert!((answer["urdf_mass"].as_f64().unwrap() / (mass - ringing.robot.segments()[0].mass) - 1.0).abs() < 1e-9, "{answer}");
+        let segments = ringing.robot.segments();
+        let mass = segments.iter().map(|segment| segment.mass).sum::<f64>() + payload_g;
+        assert_eq!(answer["mjcf_joints"], 3);
+        assert!((answer["mjcf_mass"].as_f64().unwrap() / mass - 1.0).abs() < 1e-9, "{answer}");
+        // In a URDF the base is part of the world for MuJoCo: its mass does not count.
+        assert_eq!(answer["urdf_joints"], 3);
+        assert!((answer["urdf_mass"].as_f64().unwrap() / (mass - segments[0].mass) - 1.0).abs() < 1e-9, "{answer}");
 
-    let measure = |experiment: &Experiment, name: &str| {
-        let run = experiment::run(experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
-        Measures::of(&run.recording, Mount::Clamped, None).get(name).unwrap()
-    };
-    let relative = |key: &str, ours: f64| (answer[key].as_f64().unwrap() / ours - 1.0).abs();
-    let tip = relative("tip_mm", measure(&statics, "tip_deflection_mm"));
-    let resonance = relative("resonance_hz", measure(&ringing, "resonance_hz"));
-    println!("tip differs by {tip:.2e}, resonance by {resonance:.2e}: {answer}");
-    assert!(tip < 0.002, "{answer}");
-    assert!(resonance < 0.01, "{answer}");
+        let measure = |experiment: &Experiment, name: &str| {
+            let run = experiment::run(experiment, experiment.engine().unwrap().as_mut(), |_| Control::Continue).unwrap();
+            Measures::of(&run.recording, Mount::Clamped, None).get(name).unwrap()
+        };
+        let relative = |key: &str, ours: f64| (answer[key].as_f64().unwrap() / ours - 1.0).abs();
+        let tip = relative("tip_mm", measure(&statics, "tip_deflection_mm"));
+        let resonance = relative("resonance_hz", measure(&ringing, "resonance_hz"));
+        println!("{payload}: tip differs by {tip:.2e}, resonance by {resonance:.2e}: {answer}");
+        assert!(tip < 0.002, "{answer}");
+        assert!(resonance < 0.01, "{answer}");
+    }
 }

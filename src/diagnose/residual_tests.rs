@@ -133,7 +133,7 @@ fn correlation_limit(values: usize) -> f64 {
 }
 
 /// χ² per value that noise exceeds once in a thousand, by Wilson and Hilferty's approximation.
-pub(super) fn chi2_limit(values: f64) -> f64 {
+fn chi2_limit(values: f64) -> f64 {
     let spread = 2.0 / (9.0 * values);
     (1.0 - spread + Z_ONE_SIDED * spread.sqrt()).powi(3)
 }

@@ -8,6 +8,7 @@ use std::sync::Mutex;
 use cmaes::{CMAESOptions, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::constants::Point;
 use super::{MISSING, POPULATION, Run, Search, clamped};
@@ -18,8 +19,8 @@ const MEMBERS: usize = 8;
 const JITTER: f64 = 0.002;
 /// Points that are confirmed.
 const POINTS: usize = 12;
-/// Distance (standard deviations) up to which a mean meets a number.
-const MET: f64 = 2.0;
+/// Probability with which noise alone leaves all means within the distance up to which they meet their numbers.
+const MET: f64 = 0.95;
 /// Most simulations of the search by means.
 const MOST_RUNS: usize = 11_520;
 
@@ -30,23 +31,37 @@ pub(super) struct Confirmed {
     pub spreads: Vec<Option<Spread>>,
 }
 
+/// Distance (standard deviations) up to which a mean meets its number, one of `numbers` (each as often as all together ask for; Šidák 1967): 1.96 for one, 2.57 for five, 2.93 for fifteen.
+pub(super) fn met(numbers: usize) -> f64 {
+    Normal::standard().inverse_cdf(0.5 + 0.5 * MET.powf(1.0 / numbers as f64))
+}
+
 impl Confirmed {
-    /// Distance of number `at` from the mean over the standard deviation of both.
+    /// Standard deviation of number `at` about the mean, over that of its measurement. The measured number is one run too: it scatters as the members do.
+    fn widening(&self, search: &Search, at: usize) -> f64 {
+        let scatter = (1.0 + 1.0 / MEMBERS as f64).sqrt();
+        self.spreads[at].map_or(1.0, |spread| (scatter * spread.sd / search.observed[at].1).hypot(1.0))
+    }
+
+    /// Distance of number `at` from the mean over that standard deviation.
     pub fn off(&self, search: &Search, at: usize) -> f64 {
         let (value, sigma) = search.observed[at];
-        self.spreads[at].map_or(MISSING, |spread| (value - spread.mean) / sigma.hypot(spread.sd / (MEMBERS as f64).sqrt()))
+        let widening = self.widening(search, at);
+        self.spreads[at].map_or(MISSING, |spread| (value - spread.mean) / (sigma * widening))
     }
 
     pub fn meets(&self, search: &Search, at: usize) -> bool {
-        self.off(search, at).abs() <= MET
+        self.off(search, at).abs() <= met(search.fitted.len())
     }
 
     pub fn meets_all(&self, search: &Search) -> bool {
         (0..search.fitted.len()).all(|at| self.meets(search, at))
     }
 
+    /// −2 ln L: constants whose motion scatters may meet any number, and explain none.
     fn misfit(&self, search: &Search) -> f64 {
-        (0..search.fitted.len()).map(|at| self.off(search, at).powi(2)).sum()
+        let of = |at: usize| self.off(search, at).powi(2) + 2.0 * self.widening(search, at).ln();
+        (0..search.fitted.len()).map(of).sum()
     }
 }
 
@@ -110,5 +125,16 @@ impl Search<'_> {
             search.run_parallel();
         }
         best.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::met;
+
+    /// Of the standard normal distribution: Φ(1.96) = 0.975, and Φ(2.5688) = 1 − (1 − 0.95^(1/5))/2.
+    #[test]
+    fn more_numbers_may_be_further_off() {
+        assert!((met(1) - 1.959_964).abs() < 1e-6 && (met(5) - 2.5688).abs() < 1e-3, "{} {}", met(1), met(5));
     }
 }

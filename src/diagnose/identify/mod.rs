@@ -34,6 +34,7 @@ use cmaes::{CMAESOptions, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use self::constants::Point;
 use self::emulator::{Emulator, coefficients};
@@ -41,7 +42,6 @@ use self::profile::Likelihood;
 use self::region::Region;
 use super::DiagnoseError;
 use super::dataset::{Dataset, Observation};
-use super::residual_tests::chi2_limit;
 use crate::experiment::Config;
 
 /// Scattered runs per constant and one more, of every combination.
@@ -71,6 +71,8 @@ const WAVES: u64 = 10;
 const TRIALS: u64 = 3;
 /// A region that shrinks to no less than this share is the last.
 const SETTLED: f64 = 0.7;
+/// Probability of a smaller χ² by noise alone, up to which the numbers are met.
+const NOISE: f64 = 0.999;
 /// Residual (σ) of a number that no run gives.
 const MISSING: f64 = 50.0;
 
@@ -191,7 +193,7 @@ impl Search<'_> {
     /// Whether what was found meets the numbers but for noise and scatter.
     fn is_met(&self, found: &Found) -> bool {
         let (chi2, freedom) = self.reduced_chi2(&found.emulator, &found.best.0);
-        chi2 <= chi2_limit(freedom)
+        ChiSquared::new(freedom).is_ok_and(|of_noise| chi2 * freedom <= of_noise.inverse_cdf(NOISE))
     }
 
     fn random(&self, level: usize, stage: u64) -> ChaCha8Rng {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::super::DiagnoseError;
 use super::super::dataset::{Dataset, Observation};
 use super::super::observations::setting;
-use super::confirm::Confirmed;
+use super::confirm::{self, Confirmed};
 use super::constants::{self, Point};
 use super::emulator::Emulator;
 use super::profile::{Likelihood, RANGE};
@@ -35,7 +35,7 @@ pub struct Identification {
     pub dataset: String,
     /// The result in sentences.
     pub summary: String,
-    /// True if the confirmed constants meet every number: the mean over an ensemble lies within two standard deviations.
+    /// True if the confirmed constants meet every number: the means over an ensemble are as near as noise alone leaves all of them with 95 %.
     pub meets_all: bool,
     /// The constants that were simulated as an ensemble and come closest.
     pub confirmed: Vec<(String, f64)>,
@@ -439,7 +439,8 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
     let constants = result.confirmed.iter().map(|(key, value)| format!("{key} = {}", told(key, *value))).collect::<Vec<_>>();
     let constants = constants.join(", ");
     let met = if missed.is_empty() {
-        format!("A robot with {constants} meets every number: the means of eight runs lie within two standard deviations.")
+        let within = crate::number::fixed(confirm::met(search.fitted.len()), 1);
+        format!("A robot with {constants} meets every number: the means of eight runs lie within {within} standard deviations.")
     } else {
         format!(
             "No constants within the ranges were found that meet every number; closest comes {constants}, where {}.",
