@@ -1,6 +1,6 @@
 //! Diagnoses data in a folder, and says whether the hidden cause was found.
 
-#![allow(dead_code)] // every user takes a part of it
+#![allow(dead_code, unused_imports)] // every user takes a part of it
 
 #[path = "../common/long.rs"]
 mod long;

@@ -1,7 +1,8 @@
 //! A constant set that is simulated again and again, so that what it is said to meet it does meet.
 //!
 //! Quadratic models say which constants are likely; over wide regions their scatter hides what they lack. Hence the most likely points, and the best of all
-//! that were simulated, are run as ensembles of points close by. If none meets every number, CMA-ES searches on with the means of such ensembles.
+//! that were simulated, are run as ensembles of points close by. If none has means near every number, and there are few numbers, CMA-ES searches on with the means of such
+//! ensembles.
 
 use std::sync::Mutex;
 
@@ -21,8 +22,12 @@ const JITTER: f64 = 0.002;
 const POINTS: usize = 12;
 /// Probability with which noise alone leaves all means within the distance up to which they meet their numbers.
 const MET: f64 = 0.95;
-/// Most simulations of the search by means.
+/// Combinations from which means are searched at most.
+const STARTS: usize = 3;
+/// Most simulations of a search by means.
 const MOST_RUNS: usize = 11_520;
+/// Generations below which that search finds nothing: it is for few numbers, which quadratic models with scatter can all meet in many ways.
+const LEAST_GENERATIONS: usize = 12;
 
 /// A point with the spread of every fitted number over its ensemble.
 #[derive(Debug, Clone)]
@@ -37,17 +42,20 @@ pub(super) fn met(numbers: usize) -> f64 {
 }
 
 impl Confirmed {
-    /// Standard deviation of number `at` about the mean, over that of its measurement. The measured number is one run too: it scatters as the members do.
-    fn widening(&self, search: &Search, at: usize) -> f64 {
-        let scatter = (1.0 + 1.0 / MEMBERS as f64).sqrt();
-        self.spreads[at].map_or(1.0, |spread| (scatter * spread.sd / search.observed[at].1).hypot(1.0))
+    /// Distance of number `at` from the mean over the standard deviation of the measurement and `share` of the members' variance.
+    fn distance(&self, search: &Search, at: usize, share: f64) -> f64 {
+        let (value, sigma) = search.observed[at];
+        self.spreads[at].map_or(MISSING, |spread| (value - spread.mean) / sigma.hypot(share.sqrt() * spread.sd))
     }
 
-    /// Distance of number `at` from the mean over that standard deviation.
+    /// The same over the standard deviation of both: the measured number is one run, which scatters as the members do.
     pub fn off(&self, search: &Search, at: usize) -> f64 {
-        let (value, sigma) = search.observed[at];
-        let widening = self.widening(search, at);
-        self.spreads[at].map_or(MISSING, |spread| (value - spread.mean) / (sigma * widening))
+        self.distance(search, at, 1.0 + 1.0 / MEMBERS as f64)
+    }
+
+    /// The same over that of the mean alone, which finds constants whose motion does not scatter.
+    fn off_mean(&self, search: &Search, at: usize) -> f64 {
+        self.distance(search, at, 1.0 / MEMBERS as f64)
     }
 
     pub fn meets(&self, search: &Search, at: usize) -> bool {
@@ -58,10 +66,13 @@ impl Confirmed {
         (0..search.fitted.len()).all(|at| self.meets(search, at))
     }
 
-    /// −2 ln L: constants whose motion scatters may meet any number, and explain none.
+    /// Whether every mean, scatter aside, is as near as noise leaves all of them.
+    fn is_near(&self, search: &Search) -> bool {
+        (0..search.fitted.len()).all(|at| self.off_mean(search, at).abs() <= met(search.fitted.len()))
+    }
+
     fn misfit(&self, search: &Search) -> f64 {
-        let of = |at: usize| self.off(search, at).powi(2) + 2.0 * self.widening(search, at).ln();
-        (0..search.fitted.len()).map(of).sum()
+        (0..search.fitted.len()).map(|at| self.off_mean(search, at).powi(2)).sum()
     }
 }
 
@@ -90,17 +101,34 @@ impl Search<'_> {
         sorted.sort_by(|a, b| score(a).total_cmp(&score(b)));
         let points: Vec<Point> = likely.chain(sorted.iter().map(|run| run.point.clone())).take(POINTS).collect();
         let mut random = self.random(0, 800);
-        let all: Vec<Confirmed> = points.iter().map(|point| self.confirm(point, &mut random)).collect();
-        let best = all.into_iter().min_by(|a, b| a.misfit(self).total_cmp(&b.misfit(self)))?;
-        if best.meets_all(self) || best.point.x.is_empty() {
+        let mut all: Vec<Confirmed> = points.iter().map(|point| self.confirm(point, &mut random)).collect();
+        all.sort_by(|a, b| a.misfit(self).total_cmp(&b.misfit(self)));
+        let mut best = all.first()?.clone();
+        let generations = MOST_RUNS / (POPULATION * MEMBERS * self.fitted.len());
+        if best.point.x.is_empty() || generations < LEAST_GENERATIONS {
             return Some(best);
         }
-        let found = self.search_by_means(&best);
-        Some(if found.misfit(self) < best.misfit(self) { found } else { best })
+        // From the best of every combination.
+        let mut levels = Vec::new();
+        all.retain(|one| {
+            let is_first = !levels.contains(&one.point.level);
+            levels.push(one.point.level);
+            is_first
+        });
+        for start in all.iter().take(STARTS) {
+            if best.is_near(self) {
+                break;
+            }
+            let found = self.search_by_means(start, generations);
+            if found.misfit(self) < best.misfit(self) {
+                best = found;
+            }
+        }
+        Some(best)
     }
 
     /// CMA-ES from a point on the distance of ensembles.
-    fn search_by_means(&self, from: &Confirmed) -> Confirmed {
+    fn search_by_means(&self, from: &Confirmed, generations: usize) -> Confirmed {
         let level = from.point.level;
         let best = Mutex::new(from.clone());
         let objective = |x: &DVector<f64>| {
@@ -118,7 +146,7 @@ impl Search<'_> {
         };
         let options = CMAESOptions::new(from.point.x.clone(), 0.08)
             .population_size(POPULATION)
-            .max_generations(MOST_RUNS / (POPULATION * MEMBERS * self.fitted.len()))
+            .max_generations(generations)
             .fun_target(0.5 * self.fitted.len() as f64)
             .seed(self.seed);
         if let Ok(mut search) = options.build(objective) {
