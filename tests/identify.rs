@@ -64,6 +64,16 @@ fn the_stiffness_of_a_beam_is_found_and_its_mass_beside_it_is_tied() {
     assert!((ratio / (1.2 / 0.9) - 1.0).abs() < 0.02, "{both}");
 }
 
+/// The beam's stiffness over mass is 1.33 times the nominal; all that are searched are 1.6 times and more, off by nine standard deviations and more.
+#[test]
+fn there_are_no_ranges_where_the_search_leaves_the_robot_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = identified(folder.path(), &beam("\"effect.stiffness.scale\" = { from = 1.6, to = 2.0 }"));
+    assert!(constant(&found, "effect.stiffness.scale")["range95"].is_null(), "{found}");
+    assert_eq!((found["meets_all"].as_bool(), found["corners"].as_array().unwrap().len()), (Some(false), 0), "{found}");
+    assert!(found["summary"].as_str().unwrap().contains("there are no 95 % ranges"), "{found}");
+}
+
 #[test]
 fn fewer_numbers_than_constants_give_a_set_with_its_corners_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();

@@ -26,7 +26,7 @@ const MET: f64 = 0.95;
 const STARTS: usize = 3;
 /// Most simulations of a search by means.
 const MOST_RUNS: usize = 11_520;
-/// Generations below which that search finds nothing: it is for few numbers, which quadratic models with scatter can all meet in many ways.
+/// Generations below which that search is not begun: it is for few numbers, which quadratic models with scatter can all meet in many ways.
 const LEAST_GENERATIONS: usize = 12;
 
 /// A point with the spread of every fitted number over its ensemble.

@@ -456,15 +456,13 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
         format!("{} = {possible}", c.key)
     });
     let values = ranges.chain(listed).collect::<Vec<_>>().join(", ");
-    let values = if result.constants.iter().any(|c| c.range95.is_none()) {
-        format!(
-            "The best are off by {} standard deviations rms, more than noise and scatter explain: there are no 95 % ranges. The standard deviations are too small, the ranges \
+    if result.constants.iter().any(|c| c.range95.is_none()) {
+        return format!(
+            "{met} The best are off by {} standard deviations rms, more than noise and scatter explain: there are no 95 % ranges. The standard deviations are too small, the ranges \
              of the search leave the robot out, or the model lacks something.",
             crate::number::fixed(result.misfit_sigma, 1)
-        )
-    } else {
-        format!("95 % ranges: {values}.")
-    };
+        );
+    }
     let set = match (fewer, result.is_set) {
         (true, _) => " There are fewer numbers than constants: the answer is a set, of which the corners are listed.",
         (false, true) => {
@@ -472,5 +470,5 @@ fn summary(result: &Identification, search: &Search, confirmed: &Confirmed, fewe
         }
         _ => "",
     };
-    format!("{met} {values}{set}")
+    format!("{met} 95 % ranges: {values}.{set}")
 }
