@@ -9,10 +9,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::output::{finish, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print, say};
+use crate::diagnose::DiagnoseError;
+use crate::diagnose::answer::{self, Answer};
 use crate::diagnose::dataset::{DataError, Dataset};
 use crate::diagnose::diagnosis::Verdict;
-use crate::diagnose::identify::{self, Identification};
-use crate::diagnose::{DiagnoseError, extended, observations, pipeline, protocols, quality, report, robot::RobotPlant};
+use crate::diagnose::identify::Identification;
 use crate::files::{FolderLock, Locking};
 
 /// Find from measured data what the simulation gets wrong, name the cause, and measure the gain on held-out runs.
@@ -107,13 +108,13 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
 }
 
 /// Writes what was identified.
-fn identified(args: &Args, options: Options, found: &Identification, command: &str, start: Instant) -> Result<ExitCode, Failure> {
+fn identified(args: &Args, options: Options, found: &Identification, page: &str, start: Instant) -> Result<ExitCode, Failure> {
     let json = serde_json::to_string_pretty(found).map_err(|error| unwritable(&args.out, &error))?;
     let remarks: String = found.remarks.iter().map(|remark| format!("{remark}\n")).collect();
     let printed = print(&if options.json { format!("{json}\n") } else { format!("{}\n{remarks}", found.summary) });
     work().writing = true;
     write(&args.out, "identified.toml", &found.file)?;
-    write(&args.out, "report.html", &identify::page(found, command))?;
+    write(&args.out, "report.html", page)?;
     write(&args.out, "identification.json", &format!("{json}\n"))?;
     options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
     printed?;
@@ -134,29 +135,12 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
     let start = Instant::now();
     let progress = |task: &str| bar.set_message(task.to_owned());
     let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
-    if dataset.is_identification() {
-        let found = pool.install(|| identify::identify(dataset, &progress));
-        bar.finish_and_clear();
-        return identified(args, options, &found?, &command, start);
-    }
-    let result = pool.install(|| -> Result<_, DiagnoseError> {
-        if dataset.runs.is_empty() {
-            let found = observations::diagnose(dataset, &progress)?;
-            let page = observations::page(&found, dataset, &command);
-            return Ok((found.diagnosis, None, page));
-        }
-        let checked = quality::check(dataset);
-        let plant = RobotPlant::new(dataset, &checked);
-        let roles: Vec<_> = dataset.runs.iter().map(|run| run.role).collect();
-        let separate = |models: &[crate::diagnose::plant::Model]| protocols::separate(&plant, models);
-        let outcome = pipeline::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), &progress, &separate)?;
-        let files = extended::Files::new(dataset, &plant, &outcome);
-        let context = report::Context { plant: &plant, robot: &dataset.robot, command: &command, extended: &files.experiment };
-        let page = report::page(&outcome, &context);
-        Ok((outcome.diagnosis, Some(files), page))
-    });
+    let answer = pool.install(|| answer::answer(dataset, &command, &progress));
     bar.finish_and_clear();
-    let (diagnosis, files, page) = result?;
+    let (diagnosis, files, page) = match answer? {
+        Answer::Diagnosed { diagnosis, files, page } => (diagnosis, files, page),
+        Answer::Identified { identification, page } => return identified(args, options, &identification, &page, start),
+    };
     let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(&args.out, &error))?;
     let printed = if options.json {
         print(&format!("{json}\n"))

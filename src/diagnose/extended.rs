@@ -17,6 +17,7 @@ use crate::model::Mount;
 const MOST_RECORDED: f64 = 2e7;
 
 /// The texts of the files.
+#[derive(Debug)]
 pub struct Files {
     /// `extended.toml`: an experiment for `sfers run`.
     pub experiment: String,

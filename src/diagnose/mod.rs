@@ -4,7 +4,7 @@
 //! [`plant`] is the measured system with its model; [`robot`] is the plant of this crate's robots. [`fit`] is bounded least squares; [`search`] selects
 //! causes on runs that no fit saw, by their [`split`]; [`pipeline`] combines them: discretisation before constants, constants and measurement errors before physics, and
 //! [residual tests](residual_tests) of the final model, in a [`diagnosis`]. [`protocols`] proposes the next measurement; [`report`] and [`extended`]
-//! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers, [`identify`] fits constants to many of them.
+//! write the results, with the [`names`] of causes; [`observations`] diagnoses single published numbers, [`identify`] fits constants to many of them; [`answer`] does what the data set asks, whatever its data are.
 //!
 //! # References
 //! G. Kerschen, K. Worden, A. F. Vakakis and J.-C. Golinval, "Past, present and future of nonlinear system identification in structural dynamics",
@@ -12,6 +12,8 @@
 //! discrepancy", Inverse Problems 30 (2014) 114007.
 
 mod adopted;
+#[cfg(feature = "view")]
+pub mod answer;
 pub mod bench;
 mod candidates;
 mod causes;

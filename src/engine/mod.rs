@@ -252,7 +252,7 @@ impl Posed {
 }
 
 /// A robot that can be stepped.
-pub trait Engine {
+pub trait Engine: Send {
     /// Takes the voltages of the coming step (V), one per actuator.
     ///
     /// # Errors
