@@ -1,11 +1,26 @@
 //! The native half of the Python package `sfers_rs`: thin functions and classes over the library `sfers`, which `sfers_rs/*.py` makes pleasant.
 //!
-//! Tables travel as JSON text, arrays as numpy's. The interpreter is released while something is simulated.
+//! Tables travel as JSON text, arrays as numpy's. The interpreter is released while something is simulated, and no thread outlives a call.
+
+mod error;
+mod experiment;
+mod interrupt;
+mod recording;
+mod simulation;
+mod sweep;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::experiment::{Experiment, effect_table, key_tables, preset, presets, toml_of};
+    #[pymodule_export]
+    use super::recording::{Recording, drawn};
+    #[pymodule_export]
+    use super::simulation::Simulation;
+    #[pymodule_export]
+    use super::sweep::run_sweep;
     use super::*;
 
     #[pymodule_init]
