@@ -23,6 +23,14 @@ def frame(page: str, height: int) -> str:
     return f'<iframe srcdoc="{html.escape(page, quote=True)}" style="width: 100%; height: {height}px; border: 0"></iframe>'
 
 
+def read_csv(file: Any, **keys: Any) -> pandas.DataFrame:
+    """A CSV file as pandas reads it, with numbers that are equal bit for bit: by default from pandas 3 on."""
+    import pandas
+
+    exact = {"float_precision": "round_trip"} if int(pandas.__version__.split(".")[0]) < 3 else {}
+    return pandas.read_csv(file, **exact, **keys)
+
+
 class Figure:
     """A figure as SVG; notebooks show it."""
 
@@ -109,9 +117,7 @@ class Recording(Mapping[str, Any]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """A table with a row for each record, ``t_s`` as its index, and units in the names of its columns, as in the CSV file."""
-        import pandas
-
-        return pandas.read_csv(io.StringIO(self._native.csv()), index_col="t_s", float_precision="round_trip")
+        return read_csv(io.StringIO(self._native.csv()), index_col="t_s")
 
     def to_xarray(self) -> xarray.Dataset:
         """A data set over ``time`` (s), ``joint`` (from 1), ``node`` (from 0) and ``axis`` (x, y, z); every variable has its unit as an attribute."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _native
 from .experiment import _json, _settings
+from .recording import read_csv
 
 if TYPE_CHECKING:
     import pandas
@@ -47,8 +48,6 @@ def sweep(
         ExperimentError: with ``file``, ``line`` and ``key``, if the sweep or one of its points is not valid.
         DataError: if the folder holds another sweep, or cannot be written.
     """
-    import pandas
-
     if progress is None:
         progress = sys.stderr.isatty()
     told = progress if callable(progress) else (_bar if progress else None)
@@ -65,7 +64,7 @@ def sweep(
         else:
             settings = [f"{key}={value}" for key, value in _settings(set)]
             results, *_ = _native.run_sweep(Path(file), None, folder, settings, jobs, told)
-        return pandas.read_csv(results, float_precision="round_trip")
+        return read_csv(results)
 
 
 def _tables(tables: Mapping[str, Any], folder: Path) -> str:

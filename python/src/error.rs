@@ -21,6 +21,9 @@ fn exception(class: &str, message: &str, attributes: &[(&str, Option<String>)]) 
     made.unwrap_or_else(|error| error)
 }
 
+/// Name of an experiment that is given as tables.
+pub const TABLES: &str = "the experiment";
+
 /// The number behind `line ` in a text.
 fn line_in(text: &str) -> Option<String> {
     let rest = &text[text.find("line ")? + 5..];
@@ -36,8 +39,13 @@ fn unknown_key_in(text: &str) -> Option<String> {
 
 /// `ExperimentError` with `file`, `line` and `key`.
 pub fn of_config(error: &ConfigError) -> PyErr {
-    let message = error.to_string();
+    let mut message = error.to_string();
     let (file, key) = match error {
+        // A table has no lines.
+        ConfigError::Value { place, key, message: wrong } if place.starts_with(TABLES) => {
+            message = format!("{key}: {wrong}");
+            (String::new(), Some(key.clone()))
+        }
         ConfigError::Unreadable { path, .. } | ConfigError::Data { path, .. } => (path.display().to_string(), None),
         ConfigError::Syntax { source_name, message } => (source_name.clone(), unknown_key_in(message)),
         ConfigError::Value { place, key, .. } => {
@@ -46,7 +54,8 @@ pub fn of_config(error: &ConfigError) -> PyErr {
         _ => (String::new(), None),
     };
     let line = line_in(message.strip_prefix(&file).unwrap_or(&message));
-    exception("ExperimentError", &message, &[("file", Some(file)), ("key", key), ("line", line)])
+    let file = (!file.is_empty() && file != TABLES).then_some(file);
+    exception("ExperimentError", &message, &[("file", file), ("key", key), ("line", line)])
 }
 
 /// `DataError`, or `ExperimentError` where the description is at fault.

@@ -44,7 +44,7 @@ impl Experiment {
     /// From a table in JSON, with settings (key, value in TOML); relative paths start from `folder`.
     #[staticmethod]
     fn from_json(text: &str, settings: Vec<(String, String)>, folder: PathBuf) -> PyResult<Self> {
-        let mut source = Source::from_text("the experiment", toml_of(text)?);
+        let mut source = Source::from_text(error::TABLES, toml_of(text)?);
         source.folder = folder;
         Self::of(source, settings)
     }
