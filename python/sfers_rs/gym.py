@@ -45,7 +45,7 @@ class Crawler(gymnasium.Env):
         start_angle_rad: float = 1e-4,
     ):
         self._robot = robot or Robot.crawler(friction_low=1.2, friction_high=4.0, film="both-ends", damping_eta=0.03)
-        self._options = {"engine": engine, "time_step_s": time_step_s}
+        self._options: dict[str, Any] = {"engine": engine, "time_step_s": time_step_s}
         self._steps = round(control_period_s / time_step_s)
         if not (self._steps >= 1 and abs(self._steps * time_step_s - control_period_s) < 1e-6 * control_period_s):
             raise ValueError(f"control_period_s: {control_period_s} is no multiple of the time step, {time_step_s} s")

@@ -27,7 +27,7 @@ def read_csv(file: Any, **keys: Any) -> pandas.DataFrame:
     """A CSV file as pandas reads it, with numbers that are equal bit for bit: by default from pandas 3 on."""
     import pandas
 
-    exact = {"float_precision": "round_trip"} if int(pandas.__version__.split(".")[0]) < 3 else {}
+    exact: dict[str, Any] = {"float_precision": "round_trip"} if int(pandas.__version__.split(".")[0]) < 3 else {}
     return pandas.read_csv(file, **exact, **keys)
 
 

@@ -71,14 +71,12 @@ class Simulation:
                 drive = Drive.dc(np.zeros(int(robot.tables["robot"].get("actuators", 5))))
         elif function is not None:
             drive = None
-        simulation |= {"engine": engine, "time_step_s": time_step_s}
-        self._experiment = native(robot, drive, settings=set, effects=effects, simulation=simulation)
-        self._arguments = (robot, drive, engine, time_step_s, effects, set, simulation)
+        keys = simulation | {"engine": engine, "time_step_s": time_step_s}
+        self._experiment = native(robot, drive, settings=set, effects=effects, simulation=keys)
         self._function = function
         self._native = self._experiment.simulation()
-        # Straight to the native method where nothing stands between: half a microsecond of a step of one.
-        if function is None:
-            self.step = self._native.step
+        # What makes the same simulation again.
+        self._arguments = (robot, drive, effects, set, keys)
 
     def step(self, n: int = 1, voltages: ArrayLike | None = None) -> None:
         """Takes ``n`` steps; Ctrl-C is heard between chunks of them.
@@ -180,17 +178,23 @@ class Simulation:
             raise TypeError(f"state: a {type(state).__name__}, but restore takes what save returned")
         self._native.restore(state._text)
 
-    def __getstate__(self) -> tuple:
+    def __reduce__(self) -> tuple:
         if self._function is not None:
             raise TypeError("a simulation that a function drives cannot be copied or pickled: what the function remembers is not known")
-        return self._arguments, self.save()
+        return _restored, (*self._arguments, self.save())
 
-    def __setstate__(self, pickled: tuple) -> None:
-        (robot, drive, engine, time_step_s, effects, settings, simulation), state = pickled
-        self.__init__(robot, drive, engine=engine, time_step_s=time_step_s, effects=effects, set=settings, **{
-            key: value for key, value in simulation.items() if key not in ("engine", "time_step_s")
-        })
-        self.restore(state)
+
+def _restored(
+    robot: ExperimentLike,
+    drive: DriveLike | None,
+    effects: list[Mapping[str, Any]] | None,
+    settings: Mapping[str, Any] | None,
+    keys: dict[str, Any],
+    state: State,
+) -> Simulation:
+    simulation = Simulation(robot, drive, effects=effects, set=settings, **keys)
+    simulation.restore(state)
+    return simulation
 
 
 #: A function that drives a simulation.
