@@ -2,10 +2,19 @@
 //!
 //! Tables travel as JSON text, arrays as numpy's. The interpreter is released while something is simulated.
 
+mod diagnose;
+mod error;
+mod plant;
+mod service;
+
 use pyo3::prelude::*;
 
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::diagnose::diagnose;
+    #[pymodule_export]
+    use super::plant::diagnose_plant;
     use super::*;
 
     #[pymodule_init]
