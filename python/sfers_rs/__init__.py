@@ -9,10 +9,12 @@
 Inside, everything is CGS (cm, g, s, dyn, V, rad); units stand in the names of keys and arguments, or in the documentation of what has none.
 """
 
-from . import errors
+from . import errors, plant
 from ._native import __version__
+from .diagnosis import Diagnosis, Effect, Estimate, Identification, diagnose, diagnose_plant
 from .errors import DataError, DiagnosisError, ExperimentError, SfersError, SimulationError
 from .experiment import effects, keys, mjcf, preset, presets, resolved, run, urdf
+from .plant import Plant
 from .recording import Figure, Recording
 from .robot import Drive, Robot
 from .simulation import Simulation, State
@@ -20,10 +22,15 @@ from .sweeps import sweep
 
 __all__ = [
     "DataError",
+    "Diagnosis",
     "DiagnosisError",
     "Drive",
+    "Effect",
+    "Estimate",
     "ExperimentError",
     "Figure",
+    "Identification",
+    "Plant",
     "Recording",
     "Robot",
     "SfersError",
@@ -31,10 +38,13 @@ __all__ = [
     "SimulationError",
     "State",
     "__version__",
+    "diagnose",
+    "diagnose_plant",
     "effects",
     "errors",
     "keys",
     "mjcf",
+    "plant",
     "preset",
     "presets",
     "resolved",

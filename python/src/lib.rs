@@ -2,10 +2,13 @@
 //!
 //! Tables travel as JSON text, arrays as numpy's. The interpreter is released while something is simulated, and no thread outlives a call.
 
+mod diagnose;
 mod error;
 mod experiment;
 mod interrupt;
+mod plant;
 mod recording;
+mod service;
 mod simulation;
 mod sweep;
 
@@ -21,6 +24,10 @@ mod _native {
     use super::simulation::Simulation;
     #[pymodule_export]
     use super::sweep::run_sweep;
+    #[pymodule_export]
+    use super::diagnose::diagnose;
+    #[pymodule_export]
+    use super::plant::diagnose_plant;
     use super::*;
 
     #[pymodule_init]

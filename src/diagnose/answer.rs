@@ -5,7 +5,7 @@ use super::diagnosis::Diagnosis;
 use super::identify::{self, Identification};
 use super::plant::Model;
 use super::robot::RobotPlant;
-use super::{DiagnoseError, extended, observations, pipeline, protocols, quality, report};
+use super::{DiagnoseError, extended, names, observations, pipeline, protocols, quality, report};
 
 /// The result of [`answer`].
 #[derive(Debug)]
@@ -49,7 +49,8 @@ pub fn answer(dataset: &Dataset, command: &str, progress: &(dyn Fn(&str) + Sync)
     let separate = |models: &[Model]| protocols::separate(&plant, models);
     let outcome = pipeline::diagnose(&plant, &dataset.name, &roles, checked.remarks.clone(), progress, &separate)?;
     let files = extended::Files::new(dataset, &plant, &outcome);
-    let context = report::Context { plant: &plant, robot: &dataset.robot, command, extended: &files.experiment };
+    let constants = names::constants(&dataset.robot);
+    let context = report::Context { plant: &plant, constants: &constants, command, extended: Some(&files.experiment) };
     let page = report::page(&outcome, &context);
     Ok(Answer::Diagnosed { diagnosis: Box::new(outcome.diagnosis), files: Some(files), page })
 }

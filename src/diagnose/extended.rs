@@ -36,7 +36,7 @@ impl Files {
         let of_time = |run: &usize| dataset.runs[*run].times.len() > 1;
         let run = all.iter().copied().max_by(|a, b| of_time(a).cmp(&of_time(b)).then(chi2(a).total_cmp(&chi2(b)))).unwrap_or(0);
         let (experiment, drive) = experiment(dataset, plant, outcome.extended.model(), run, &outcome.nuisances[run].shares);
-        Self { experiment, drive, residuals: residuals(plant, outcome) }
+        Self { experiment, drive, residuals: residuals(plant, outcome, "_mm", &|run| plant.start(run)) }
     }
 }
 
@@ -131,10 +131,12 @@ fn csv_text(rows: impl Iterator<Item = Vec<String>>) -> String {
     String::from_utf8_lossy(&table.into_inner().unwrap_or_default()).into_owned()
 }
 
-/// All measured and predicted values, in digits that restore the same bits.
-fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
+/// All measured and predicted values (CSV), in digits that restore the same bits. `unit` ends the names of their columns; `start` is the time (s) of a
+/// run's time 0.
+pub fn residuals(plant: &dyn Plant, outcome: &Outcome, unit: &str, start: &dyn Fn(usize) -> f64) -> String {
     let channels = plant.channels();
-    let head = ["run", "role", "channel", "t_s", "measured_mm", "nominal_mm", "calibrated_mm", "extended_mm", "used"];
+    let values = ["measured", "nominal", "calibrated", "extended"].map(|of| format!("{of}{unit}"));
+    let head = ["run", "role", "channel", "t_s"].map(str::to_owned).into_iter().chain(values).chain(["used".into()]).collect();
     let rows = (0..plant.signals().len()).flat_map(|run| {
         let signal = &plant.signals()[run];
         let role = outcome.split.role(run);
@@ -147,9 +149,9 @@ fn residuals(plant: &RobotPlant, outcome: &Outcome) -> String {
                 if used { format!("{value:?}") } else { String::new() }
             });
             let named = [&signal.id, role, &channels[signal.channels[i]]].map(str::to_owned);
-            let numbers = [signal.times[i] + plant.start(run), signal.values[i]].map(|x| format!("{x:?}"));
+            let numbers = [signal.times[i] + start(run), signal.values[i]].map(|x| format!("{x:?}"));
             named.into_iter().chain(numbers).chain(predicted).chain([u8::from(used).to_string()]).collect()
         })
     });
-    csv_text(std::iter::once(head.map(str::to_owned).to_vec()).chain(rows))
+    csv_text(std::iter::once(head).chain(rows))
 }

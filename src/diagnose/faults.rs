@@ -64,7 +64,7 @@ pub(super) fn remarks(bench: &[BenchFault], noise: &Noise, plant: &dyn Plant) ->
             let unit = if fault.unit.is_empty() { "%" } else { &fault.unit };
             let what = match fault.id {
                 "clock offset" => "clocks differ",
-                "clock rate" => "the clock of the rows and that of the voltages run at rates that differ",
+                "clock rate" => "the clock of the rows and that of the inputs run at rates that differ",
                 "gain" => "gains differ",
                 "scale" => "scales of the picture differ",
                 "zero" => "zeros differ",

@@ -26,7 +26,7 @@ use super::verdict::{Judged, LEFT_OVER, doubtful, insufficient_data, judge};
 /// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
 const SEARCH_RESOLUTION: f64 = 10.0;
 /// The next experiment where the data are insufficient.
-const MORE_RUNS: &str = "measure three runs or more under voltages of different size and speed, with a hundred rows each or more";
+const MORE_RUNS: &str = "measure three runs or more under inputs of different size and speed, with a hundred rows each or more";
 
 /// The diagnosis with its models, for figures and for the extended experiment.
 pub struct Outcome {

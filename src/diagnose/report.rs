@@ -10,7 +10,6 @@ use super::pipeline::Outcome;
 use super::plant::{Plant, Signal};
 use super::residual_tests::{ResidualTest, rows_by_channel, sum_over};
 use super::summary::failing;
-use crate::model::Robot;
 use crate::view::page::{Cell, HALF, Table, document, figure};
 use crate::view::{Figure, Mark, digits_for, escape, fixed, minus, signed, significant};
 
@@ -26,12 +25,12 @@ const LARGE: f64 = 1.2;
 pub struct Context<'a> {
     /// The plant.
     pub plant: &'a dyn Plant,
-    /// The nominal robot, for the values of its constants.
-    pub robot: &'a Robot,
+    /// Constants of the nominal model that are shown in their own units: id, value, unit, as of [`names::constants`]; none for plants other than robots.
+    pub constants: &'a [(&'static str, f64, &'static str)],
     /// The command that reproduces the report.
     pub command: &'a str,
-    /// The extended experiment (TOML).
-    pub extended: &'a str,
+    /// The extended experiment (TOML); none for plants other than robots.
+    pub extended: Option<&'a str>,
 }
 
 /// A text of the diagnosis as HTML.
@@ -111,17 +110,19 @@ pub fn page(outcome: &Outcome, context: &Context) -> String {
     }
     out.push_str("<h2>What to measure next</h2>\n");
     let next = d.next_experiment.as_deref().unwrap_or(match d.verdict {
-        Verdict::Unexplained => "Repeat the worst runs first: what does not repeat is not the robot's.",
+        Verdict::Unexplained => "Repeat the worst runs first: what does not repeat is not the model's.",
         _ => "Nothing is tied: a run at an amplitude and a frequency that no run has yet would test the extended model best.",
     });
     let _ = writeln!(out, "<p>{}</p>", prose(next));
-    let _ = write!(
-        out,
-        "<h2>How to reproduce</h2>\n<p><code>{}</code></p><p>The extended model, <code>extended.toml</code>; run it with \
-         <code>sfers run extended.toml</code>:</p><pre>{}</pre>\n",
-        escape(context.command),
-        context.extended.lines().map(escape).collect::<Vec<_>>().join("\n")
-    );
+    let _ = write!(out, "<h2>How to reproduce</h2>\n<p><code>{}</code></p>", escape(context.command));
+    if let Some(extended) = context.extended {
+        let _ = write!(
+            out,
+            "<p>The extended model, <code>extended.toml</code>; run it with <code>sfers run extended.toml</code>:</p><pre>{}</pre>",
+            extended.lines().map(escape).collect::<Vec<_>>().join("\n")
+        );
+    }
+    out.push('\n');
     document(&format!("Diagnosis of {}", d.dataset), &out)
 }
 
@@ -254,7 +255,6 @@ fn ranking(out: &mut String, d: &Diagnosis, unit: &str) {
 
 fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
     let d = &outcome.diagnosis;
-    let constants = names::constants(context.robot);
     out.push_str("<h2>Parameters</h2>\n");
     let columns = ["#value", "#95 % range", "unit", "remark"];
     if d.effects.is_empty() {
@@ -263,7 +263,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
         let mut table = Table::new(&["cause, form", "constant", columns[0], columns[1], columns[2], columns[3]]).stacking();
         for effect in &d.effects {
             for estimate in &effect.parameters {
-                let shown = names::shown(&effect.id, estimate, &constants);
+                let shown = names::shown(&effect.id, estimate, context.constants);
                 let cause = names::with_form(&effect.id, &names::form_of(effect));
                 let note = Cell::from(shown.note).bad_if(estimate.at_bound);
                 table.row([cause.into(), shown.name.into(), shown.value.into(), shown.range.into(), shown.unit.into(), note]);
@@ -299,7 +299,7 @@ fn parameters(out: &mut String, outcome: &Outcome, context: &Context) {
     });
     let mut table = Table::new(&["constant", columns[0], columns[1], columns[2], columns[3]]).stacking();
     for (id, estimate) in ids.zip(&d.calibrated.parameters) {
-        let shown = names::shown(id, estimate, &constants);
+        let shown = names::shown(id, estimate, context.constants);
         let name = if shown.name == names::cause(id) { shown.name } else { format!("{}, {}", names::cause(id), shown.name) };
         let note = Cell::from(shown.note).bad_if(estimate.at_bound);
         table.row([name.into(), shown.value.into(), shown.range.into(), shown.unit.into(), note]);

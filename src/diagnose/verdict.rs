@@ -159,7 +159,7 @@ pub(super) fn insufficient_data(plant: &dyn Plant, split: &Split) -> Option<Stri
     };
     let levels: Vec<f64> = signals.iter().filter_map(|signal| signal.inputs.first().copied()).collect();
     if split.all().iter().all(is_constant) && levels.iter().all(|level| (level - levels[0]).abs() < 1e-9) {
-        return Some("the voltage is constant and the same in all runs: these data determine no more than an offset".into());
+        return Some("the input is constant and the same in all runs: these data determine no more than an offset".into());
     }
     None
 }
