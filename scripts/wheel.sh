@@ -7,7 +7,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 bash scripts/debian.sh build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv
-bash scripts/python.sh
+tests=false
+if [ "${1:-}" = --test ]; then tests=true; fi
+bash scripts/python.sh $($tests || echo build)
 export PATH="$PWD/.venv/bin:$PATH" VIRTUAL_ENV="$PWD/.venv"
 
 rm -rf target/wheel target/wheel-python python/licences
@@ -22,7 +24,7 @@ echo "wheel: $wheel, $((size / 1024)) KiB"
 target/wheel-python/bin/python -m pip install --quiet --disable-pip-version-check "$wheel"
 (cd target && wheel-python/bin/python ../python/tests/first_steps.py)
 
-if [ "${1:-}" = --test ]; then
+if $tests; then
   .venv/bin/python -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel"
   .venv/bin/python -m mypy.stubtest sfers_rs._native
   (cd target && ../.venv/bin/python -m mypy --package sfers_rs)

@@ -13,6 +13,8 @@ __all__ = [
     "Recording",
     "Simulation",
     "__version__",
+    "diagnose",
+    "diagnose_plant",
     "drawn",
     "effect_table",
     "key_tables",
@@ -119,3 +121,14 @@ def run_sweep(
     jobs: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[str, int, int, int]: ...
+def diagnose(
+    dataset: str, command: str, threads: int | None = None, progress: Callable[[str], Any] | None = None
+) -> tuple[str, str, list[tuple[str, str]]]: ...
+def diagnose_plant(
+    given: Any,
+    command: str,
+    predict: Callable[..., Any],
+    stopped: Any,
+    threads: int | None = None,
+    progress: Callable[[str], Any] | None = None,
+) -> tuple[str, str, list[tuple[str, str]]]: ...

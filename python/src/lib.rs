@@ -17,17 +17,17 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
+    use super::diagnose::diagnose;
+    #[pymodule_export]
     use super::experiment::{Experiment, effect_table, key_tables, preset, presets, toml_of};
+    #[pymodule_export]
+    use super::plant::diagnose_plant;
     #[pymodule_export]
     use super::recording::{Recording, drawn};
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
     use super::sweep::run_sweep;
-    #[pymodule_export]
-    use super::diagnose::diagnose;
-    #[pymodule_export]
-    use super::plant::diagnose_plant;
     use super::*;
 
     #[pymodule_init]
