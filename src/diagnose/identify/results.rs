@@ -15,6 +15,7 @@ use super::emulator::Emulator;
 use super::profile::{Likelihood, RANGE};
 use super::{Found, Run, Search};
 use crate::experiment::Spread;
+use crate::number::signed;
 use crate::words::split_unit;
 
 /// Correlation from which on two constants are tied.
@@ -174,7 +175,7 @@ impl<'a> Likely<'a> {
     /// Mean of what an observation would be with the likely constants, its standard deviation by them, and the scatter about that; `None` if most runs fail.
     fn foretell(&self, search: &Search, observation: &Observation, points: &[Point]) -> Option<[f64; 3]> {
         let values: Vec<Option<f64>> =
-            points.par_iter().map(|point| search.space.predict(search.nominal, observation, point)).collect();
+            points.par_iter().map(|point| search.space.predict(search.nominal, observation, point, 1)).collect();
         let there: Vec<(&Point, f64)> =
             points.iter().zip(&values).filter_map(|(point, value)| Some((point, (*value)?))).collect();
         let columns = self.found.best.0.len() + 1;
@@ -192,12 +193,13 @@ impl<'a> Likely<'a> {
     }
 }
 
-/// Builds the result from what was found for each hopeful combination.
+/// Builds the result from what was found for each hopeful combination, by `runs` and `fine` more with finer steps.
 pub(super) fn results(
     search: &Search,
     dataset: &Dataset,
     found: &[Found],
     runs: &[Run],
+    fine: usize,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Identification, DiagnoseError> {
     let Some(best) = found.first() else {
@@ -208,6 +210,15 @@ pub(super) fn results(
     let mut remarks = Vec::new();
     if possible.iter().any(|found| !found.is_settled) {
         remarks.push("the region of likely constants still changed in the last wave: ranges are not converged".into());
+    }
+    for (observation, moved) in search.fitted.iter().zip(&best.moved) {
+        if let Some(moved) = moved.filter(|moved| moved.abs() > observation.sigma) {
+            let named = format!("{} ({})", observation.measure, setting(observation));
+            remarks.push(format!(
+                "{named} changes by {} from the given time step to a quarter of it, which the ranges are of",
+                signed(moved, 3)
+            ));
+        }
     }
     let is_met = search.is_met(best);
     let (mut constants, mut corners) = constants_of(search, best, &possible);
@@ -256,7 +267,7 @@ pub(super) fn results(
         facts,
         corners,
         next,
-        simulated: runs.len(),
+        simulated: runs.len() + fine,
         remarks,
         file,
     };
