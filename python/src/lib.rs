@@ -2,6 +2,8 @@
 //!
 //! Tables travel as JSON text, arrays as numpy's. The interpreter is released while something is simulated.
 
+mod pybullet;
+
 use pyo3::prelude::*;
 
 #[pymodule]
@@ -10,6 +12,9 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let names = PyModule::new(module.py(), "sfers_rs.pybullet")?;
+        pybullet::register(&names)?;
+        module.add("pybullet", names)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
