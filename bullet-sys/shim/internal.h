@@ -82,9 +82,12 @@ struct Body {
   std::vector<double> frictions;
   std::vector<btVector3> com_to_box;
   bool has_offsets = false;  // whether any of com_to_box is not zero
+  bool has_damping = false;  // whether a joint has had a damping
 
   // Puts the colliders where the boxes are; Bullet puts them at the centres of mass.
   void move_colliders();
+  // Adds the torques of joint damping, which Bullet leaves to the caller, to those for the coming step.
+  void damp_joints();
 };
 
 inline btVector3 vector(const double *v) { return btVector3(v[0], v[1], v[2]); }

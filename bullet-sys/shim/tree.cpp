@@ -75,6 +75,14 @@ void add_motors(bs_world &world, Body &body, double impulse) {
 
 }  // namespace
 
+void bs::Body::damp_joints() {
+  if (!has_damping) return;
+  for (int i = 0; i < multibody->getNumLinks(); ++i) {
+    const btMultibodyLink &link = multibody->getLink(i);
+    if (link.m_dofCount > 0) multibody->addJointTorque(i, -link.m_jointDamping * multibody->getJointVel(i));
+  }
+}
+
 extern "C" {
 
 int32_t bs_tree_add(bs_world *world, const bs_tree_body *bodies, int32_t count, double motor_impulse, int32_t *body_index, char *error,
@@ -194,6 +202,7 @@ int32_t bs_joint_damping_set(bs_world *world, int32_t body, int32_t link, double
     require(link >= 0 && link < multibody.getNumLinks(), "no link of that index");
     require(damping >= 0 && std::isfinite(damping), "a damping must not be negative, and finite");
     multibody.getLink(link).m_jointDamping = damping;
+    world->bodies[static_cast<size_t>(body)].has_damping |= damping > 0;
   });
 }
 

@@ -87,6 +87,7 @@ int32_t bs_world_step(bs_world *world, double time_step, char *error, int32_t er
     // Bullet takes a step within SIMD_EPSILON of zero for no step at all.
     bs::require(time_step > SIMD_EPSILON, "the time step must be above 2.2e-16 s");
     for (const auto &constraint : world->constraints) constraint->begin_step();
+    for (bs::Body &body : world->bodies) body.damp_joints();
     world->dynamics.stepSimulation(time_step, 0);
     for (bs::Body &body : world->bodies) body.move_colliders();
   });

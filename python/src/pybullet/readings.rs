@@ -70,7 +70,7 @@ fn getJointState<'py>(
     joint_tuple(py, joint_at(&found, body, joint)?, &floats(py, &[0.0; 6])?)
 }
 
-/// The same of several joints.
+/// The same of several joints; None of none, as PyBullet has it.
 #[pyfunction]
 #[pyo3(signature = (bodyUniqueId, jointIndices, physicsClientId=0))]
 fn getJointStates<'py>(
@@ -78,13 +78,14 @@ fn getJointStates<'py>(
     bodyUniqueId: &Bound<'py, PyAny>,
     jointIndices: &Bound<'py, PyAny>,
     physicsClientId: i32,
-) -> PyResult<Bound<'py, PyTuple>> {
+) -> PyResult<Option<Bound<'py, PyTuple>>> {
     let (body, indices) = (integer("bodyUniqueId", bodyUniqueId)?, integer_list("jointIndices", jointIndices)?);
     let found = with(physicsClientId, |client| joints(client, body))?;
     // One tuple of zeros serves all: nobody can change it.
     let reaction = floats(py, &[0.0; 6])?;
     let states = indices.iter().map(|&joint| joint_tuple(py, joint_at(&found, body, joint)?, &reaction));
-    PyTuple::new(py, states.collect::<PyResult<Vec<_>>>()?)
+    let states = states.collect::<PyResult<Vec<_>>>()?;
+    if states.is_empty() { Ok(None) } else { PyTuple::new(py, states).map(Some) }
 }
 
 fn links(client: &mut Client, body: i32, with_velocities: bool) -> PyResult<Vec<LinkReading>> {
