@@ -12,6 +12,8 @@ mod service;
 mod simulation;
 mod sweep;
 
+mod pybullet;
+
 use pyo3::prelude::*;
 
 #[pymodule]
@@ -32,6 +34,9 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let names = PyModule::new(module.py(), "sfers_rs.pybullet")?;
+        pybullet::register(&names)?;
+        module.add("pybullet", names)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
