@@ -28,7 +28,7 @@ pub use constants::{Identify, Searched};
 pub use page::page;
 pub use results::{Corner, Fact, Identification, Identified, Listed, Proposal};
 
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use cmaes::{CMAESOptions, DVector};
 use rand_chacha::ChaCha8Rng;
@@ -94,6 +94,10 @@ struct Search<'a> {
     /// The same, with the standard deviations of the search everywhere.
     coarse: Vec<(f64, f64)>,
     seed: u64,
+    /// The current task, ...
+    task: Mutex<String>,
+    /// ... and who hears of it, once more with every simulation: whoever wants the work to end can end it there.
+    progress: &'a (dyn Fn(&str) + Sync),
 }
 
 /// What was found for one combination of values.
@@ -128,14 +132,15 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
         (observation.value, observation.sigma.hypot(COARSE * rms))
     };
     let coarse = fitted.iter().map(coarse).collect();
-    let search = Search { nominal: &dataset.nominal, space, fitted, observed, coarse, seed: identify.seed };
+    let task = Mutex::default();
+    let search = Search { nominal: &dataset.nominal, space, fitted, observed, coarse, seed: identify.seed, task, progress };
     let mut runs = Vec::new();
     let mut found: Vec<Found> = Vec::new();
     let mut starts = Vec::new();
     for at in 0..SEARCHES {
         let mut hopeful = Vec::new();
         for level in 0..space.levels.len() {
-            progress(&format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
+            search.begin(format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
             let first = runs.len();
             search.everywhere(level, at, &mut runs, &mut starts);
             let scores: Vec<f64> = runs[first..].iter().map(|run| search.coarse_score(run)).collect();
@@ -148,21 +153,34 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
         hopeful.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, level, region) in hopeful {
             let is_met = found.iter().any(|found| search.is_met(found));
-            found.extend(search.closely(level, at, region, is_met, &mut runs, progress));
+            found.extend(search.closely(level, at, region, is_met, &mut runs));
         }
         found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
         if space.constants.is_empty() || found.first().is_some_and(|best| search.is_met(best)) {
             break;
         }
     }
-    results::results(&search, dataset, &found, &runs, progress)
+    results::results(&search, dataset, &found, &runs)
 }
 
 impl Search<'_> {
+    /// Says what is done from now on.
+    fn begin(&self, task: String) {
+        (self.progress)(&task);
+        *self.task.lock().unwrap_or_else(PoisonError::into_inner) = task;
+    }
+
+    /// What an observation would be at a point.
+    fn predict(&self, observation: &Observation, point: &Point) -> Option<f64> {
+        let task = self.task.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        (self.progress)(&task);
+        self.space.predict(self.nominal, observation, point)
+    }
+
     /// What every fitted observation would be at the points, in parallel.
     fn evaluate(&self, points: Vec<Point>) -> Vec<Run> {
         let run = |point: Point| {
-            let predict = |observation: &&Observation| self.space.predict(self.nominal, observation, &point);
+            let predict = |observation: &&Observation| self.predict(observation, &point);
             let values = self.fitted.par_iter().map(predict).collect();
             Run { point, values }
         };
@@ -222,7 +240,7 @@ impl Search<'_> {
             let (inside, penalty) = clamped(x.as_slice());
             let run = self.evaluate(vec![Point { level, x: inside }]).remove(0);
             let score = self.coarse_score(&run) + penalty;
-            seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(run);
+            seen.lock().unwrap_or_else(PoisonError::into_inner).push(run);
             score
         };
         let options = CMAESOptions::new(start.x.clone(), FIRST_STEP)
@@ -232,7 +250,7 @@ impl Search<'_> {
         if let Ok(mut search) = options.build(objective) {
             search.run_parallel();
         }
-        let mut seen = seen.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut seen = seen.into_inner().unwrap_or_else(PoisonError::into_inner);
         // In an order that does not depend on threads.
         let compare = |a: &Run, b: &Run| a.point.x.iter().zip(&b.point.x).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
         seen.sort_by(|a, b| compare(a, b).unwrap_or(std::cmp::Ordering::Equal));
@@ -250,12 +268,11 @@ impl Search<'_> {
         mut region: Region,
         is_met_elsewhere: bool,
         runs: &mut Vec<Run>,
-        progress: &(dyn Fn(&str) + Sync),
     ) -> Option<Found> {
         let constants = self.space.constants.len();
         let mut found = None;
         for wave in 1..=WAVES {
-            progress(&format!("wave {wave} around the best, {} runs so far", runs.len()));
+            self.begin(format!("wave {wave} around the best, {} runs so far", runs.len()));
             let count = LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants));
             let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
             let fresh =
