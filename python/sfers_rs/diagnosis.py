@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import io
 import json
 import os
 from collections.abc import Callable, Mapping
@@ -174,6 +175,14 @@ class Diagnosis(_Found):
         ]
         return pandas.DataFrame(rows, columns=columns)
 
+    def residuals(self) -> pandas.DataFrame:
+        """A row for each measured value: run, role, channel, time (s), what was measured and what the nominal, the re-tuned (``calibrated``) and the extended
+        model make of it, and whether it counted (``used``). Columns of robots end in ``_mm``. Needs pandas; empty for single numbers."""
+        import pandas
+
+        text = self.files.get("residuals.csv")
+        return pandas.DataFrame() if text is None else pandas.read_csv(io.StringIO(text))
+
     def __repr__(self) -> str:
         return f"<Diagnosis of {self.dataset}: {self.verdict}. {self.summary}>"
 
@@ -223,6 +232,11 @@ class Identification(_Found):
 
     def __repr__(self) -> str:
         return f"<Identification of {self.dataset}: {self.summary}>"
+
+
+def _processors() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def diagnose(
@@ -284,17 +298,19 @@ def diagnose_plant(
     if parallel not in (False, True, "processes", "threads"):
         raise ValueError(f'parallel is False, True, "processes" or "threads", not {parallel!r}')
     if jobs is None:
-        jobs = (os.cpu_count() or 1) if parallel else 1
+        jobs = _processors() if parallel else 1
     elif not isinstance(jobs, int) or not 1 <= jobs <= 1024:
         raise ValueError(f"jobs must be 1 to 1024, not {jobs!r}")
-    workers = Workers(described, jobs) if jobs > 1 and parallel != "threads" else None
-    predict = workers.predict if workers else described.predict
-    stopped = workers.close if workers else lambda: None
     command = f"sfers_rs.diagnose_plant({type(plant).__name__}(...), name={str(name)!r})"
-    try:
-        _, text, files = _native.diagnose_plant(given, command, predict, stopped, jobs if jobs > 1 else None, progress)
-    finally:
-        stopped()
+    if jobs > 1 and parallel != "threads":
+        workers = Workers(described, jobs)
+        try:
+            _, text, files = _native.diagnose_plant(given, command, workers.predict, workers.close, jobs, progress)
+        finally:
+            workers.close()
+    else:
+        threads = jobs if jobs > 1 else None
+        _, text, files = _native.diagnose_plant(given, command, described.predict, lambda: None, threads, progress)
     found = Diagnosis(json.loads(text), dict(files), described.unit)
     if out is not None:
         found.save(out)

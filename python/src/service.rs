@@ -6,7 +6,9 @@
 //! process may fork before and after.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -51,6 +53,10 @@ pub enum Call {
 /// The work's end of the line to the caller's thread.
 pub struct Line {
     calls: Sender<Call>,
+    /// True once the work shall end.
+    stop: Arc<AtomicBool>,
+    /// The task that was told of last.
+    task: Mutex<String>,
 }
 
 impl Line {
@@ -60,9 +66,17 @@ impl Line {
         }
     }
 
-    /// Tells the caller what is being done.
+    /// Tells the caller what is being done, once while it lasts. Every call is a place where the work may end.
     pub fn progress(&self, task: &str) {
-        self.send(Call::Progress(task.to_owned()));
+        if self.stop.load(Ordering::Relaxed) {
+            resume_unwind(Box::new(Stopped));
+        }
+        let mut told = self.task.lock().unwrap_or_else(PoisonError::into_inner);
+        if *told != task {
+            task.clone_into(&mut told);
+            drop(told);
+            self.send(Call::Progress(task.to_owned()));
+        }
     }
 
     /// The prediction of a run, by the caller's thread.
@@ -100,7 +114,8 @@ pub fn serve<T: Send>(
     stopped: impl FnOnce(Python<'_>),
 ) -> PyResult<T> {
     let (calls, asked) = mpsc::channel();
-    let line = Line { calls };
+    let stop = Arc::new(AtomicBool::new(false));
+    let line = Line { calls, stop: stop.clone(), task: Mutex::default() };
     thread::scope(|scope| {
         let worker = scope.spawn(move || {
             let line = line;
@@ -121,13 +136,16 @@ pub fn serve<T: Send>(
             match answered.and_then(|()| py.check_signals()) {
                 Ok(()) => asked = Some(calls),
                 // The line is closed: whoever asks from now on unwinds.
-                Err(raised) => error = Some(raised),
+                Err(raised) => {
+                    error = Some(raised);
+                    stop.store(true, Ordering::Relaxed);
+                }
             }
         }
         if error.is_some() {
             stopped(py);
         }
-        let result = py.detach(|| worker.join()).unwrap_or_else(|panic| Err(panic));
+        let result = py.detach(|| worker.join()).unwrap_or_else(Err);
         match (error, result) {
             (Some(error), _) => Err(error),
             (None, Ok(result)) => result,

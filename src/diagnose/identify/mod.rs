@@ -29,7 +29,7 @@ pub use constants::{Identify, Searched};
 pub use page::page;
 pub use results::{Corner, Fact, Identification, Identified, Listed, Proposal};
 
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use cmaes::{CMAESOptions, DVector};
 use rand_chacha::ChaCha8Rng;
@@ -105,6 +105,10 @@ struct Search<'a> {
     /// The same, with the standard deviations of the search everywhere.
     coarse: Vec<(f64, f64)>,
     seed: u64,
+    /// The current task, ...
+    task: Mutex<String>,
+    /// ... and who hears of it, once more with every simulation: whoever wants the work to end can end it there.
+    progress: &'a (dyn Fn(&str) + Sync),
 }
 
 /// What was found for one combination of values.
@@ -141,14 +145,15 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
         (observation.value, observation.sigma.hypot(COARSE * rms))
     };
     let coarse = fitted.iter().map(coarse).collect();
-    let search = Search { nominal: &dataset.nominal, space, fitted, observed, coarse, seed: identify.seed };
+    let task = Mutex::default();
+    let search = Search { nominal: &dataset.nominal, space, fitted, observed, coarse, seed: identify.seed, task, progress };
     let mut runs = Vec::new();
     let mut found: Vec<Found> = Vec::new();
     let mut starts = Vec::new();
     for at in 0..SEARCHES {
         let mut hopeful = Vec::new();
         for level in 0..space.levels.len() {
-            progress(&format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
+            search.begin(format!("searching everywhere, {} of {}", level + 1, space.levels.len()));
             let first = runs.len();
             search.everywhere(level, at, &mut runs, &mut starts);
             let scores: Vec<f64> = runs[first..].iter().map(|run| search.coarse_score(run)).collect();
@@ -161,12 +166,7 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
         hopeful.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, level, region) in hopeful {
             let is_met = found.iter().any(|found| search.is_met(found));
-            found.extend(search.closely(
-                &Stage { level, search: at, finer: 1, is_met_elsewhere: is_met },
-                region,
-                &mut runs,
-                progress,
-            ));
+            found.extend(search.closely(&Stage { level, search: at, finer: 1, is_met_elsewhere: is_met }, region, &mut runs));
         }
         found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
         if space.constants.is_empty() || found.first().is_some_and(|best| search.is_met(best)) {
@@ -176,13 +176,26 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
     let least = found.first().map_or(f64::INFINITY, |best| best.best.1);
     let mut fine = Vec::new();
     for found in found.iter_mut().filter(|found| found.best.1 <= least + KEPT) {
-        search.finely(found, &mut fine, progress);
+        search.finely(found, &mut fine);
     }
     found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
-    results::results(&search, dataset, &found, &runs, fine.len(), progress)
+    results::results(&search, dataset, &found, &runs, fine.len())
 }
 
 impl Search<'_> {
+    /// Says what is done from now on.
+    fn begin(&self, task: String) {
+        (self.progress)(&task);
+        *self.task.lock().unwrap_or_else(PoisonError::into_inner) = task;
+    }
+
+    /// What an observation would be at a point, with time steps divided by `finer`.
+    fn predict(&self, observation: &Observation, point: &Point, finer: u64) -> Option<f64> {
+        let task = self.task.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        (self.progress)(&task);
+        self.space.predict(self.nominal, observation, point, finer)
+    }
+
     /// What every fitted observation would be at the points, in parallel.
     fn evaluate(&self, points: Vec<Point>) -> Vec<Run> {
         self.evaluate_with(points, 1)
@@ -191,7 +204,7 @@ impl Search<'_> {
     /// The same with time steps divided by `finer`.
     fn evaluate_with(&self, points: Vec<Point>, finer: u64) -> Vec<Run> {
         let run = |point: Point| {
-            let predict = |observation: &&Observation| self.space.predict(self.nominal, observation, &point, finer);
+            let predict = |observation: &&Observation| self.predict(observation, &point, finer);
             let values = self.fitted.par_iter().map(predict).collect();
             Run { point, values }
         };
@@ -251,7 +264,7 @@ impl Search<'_> {
             let (inside, penalty) = clamped(x.as_slice());
             let run = self.evaluate(vec![Point { level, x: inside }]).remove(0);
             let score = self.coarse_score(&run) + penalty;
-            seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(run);
+            seen.lock().unwrap_or_else(PoisonError::into_inner).push(run);
             score
         };
         let options = CMAESOptions::new(start.x.clone(), FIRST_STEP)
@@ -261,7 +274,7 @@ impl Search<'_> {
         if let Ok(mut search) = options.build(objective) {
             search.run_parallel();
         }
-        let mut seen = seen.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut seen = seen.into_inner().unwrap_or_else(PoisonError::into_inner);
         // In an order that does not depend on threads.
         let compare = |a: &Run, b: &Run| a.point.x.iter().zip(&b.point.x).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
         seen.sort_by(|a, b| compare(a, b).unwrap_or(std::cmp::Ordering::Equal));
@@ -271,10 +284,10 @@ impl Search<'_> {
     }
 
     /// Waves with finer steps from where the others ended.
-    fn finely(&self, found: &mut Found, runs: &mut Vec<Run>, progress: &(dyn Fn(&str) + Sync)) {
+    fn finely(&self, found: &mut Found, runs: &mut Vec<Run>) {
         let region = found.emulator.region.clone();
         let stage = Stage { level: found.level, search: SEARCHES, finer: FINER, is_met_elsewhere: false };
-        let Some(mut fine) = self.closely(&stage, region, runs, progress) else { return };
+        let Some(mut fine) = self.closely(&stage, region, runs) else { return };
         let before = &found.emulator;
         let moved = |(fine_surface, surface): (&Option<Surface>, &Option<Surface>)| {
             let x = &fine.best.0;
@@ -286,12 +299,13 @@ impl Search<'_> {
 
     /// Waves of runs in ever smaller regions around the likely points, at most a few if they miss the numbers and another combination meets them; `None` if they
     /// give no measures.
-    fn closely(&self, stage: &Stage, mut region: Region, runs: &mut Vec<Run>, progress: &(dyn Fn(&str) + Sync)) -> Option<Found> {
+    fn closely(&self, stage: &Stage, mut region: Region, runs: &mut Vec<Run>) -> Option<Found> {
         let Stage { level, search, finer, is_met_elsewhere } = *stage;
         let constants = self.space.constants.len();
         let mut found = None;
         for wave in 1..=WAVES {
-            progress(&format!("wave {wave} around the best, {} runs so far", runs.len()));
+            let steps = if finer > 1 { " with finer steps" } else { "" };
+            self.begin(format!("wave {wave}{steps} around the best, {} runs so far", runs.len()));
             let count = LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants));
             let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
             let fresh =

@@ -174,8 +174,7 @@ impl<'a> Likely<'a> {
 
     /// Mean of what an observation would be with the likely constants, its standard deviation by them, and the scatter about that; `None` if most runs fail.
     fn foretell(&self, search: &Search, observation: &Observation, points: &[Point]) -> Option<[f64; 3]> {
-        let values: Vec<Option<f64>> =
-            points.par_iter().map(|point| search.space.predict(search.nominal, observation, point, 1)).collect();
+        let values: Vec<Option<f64>> = points.par_iter().map(|point| search.predict(observation, point, 1)).collect();
         let there: Vec<(&Point, f64)> =
             points.iter().zip(&values).filter_map(|(point, value)| Some((point, (*value)?))).collect();
         let columns = self.found.best.0.len() + 1;
@@ -200,7 +199,6 @@ pub(super) fn results(
     found: &[Found],
     runs: &[Run],
     fine: usize,
-    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Identification, DiagnoseError> {
     let Some(best) = found.first() else {
         return Err("no constants within the ranges give the measured numbers: every run fails, or most of them; widen [identify.vary], or simulate longer".into());
@@ -237,10 +235,10 @@ pub(super) fn results(
         Listed { key: key.clone(), value: space.levels[best.level][at], possible: values }
     });
     let likely = Likely::new(search, best, None).ok_or("the information matrix cannot be inverted")?;
-    progress("confirming the best");
+    search.begin("confirming the best".into());
     let likely_points = possible.iter().map(|found| Point { level: found.level, x: found.best.0.clone() });
     let confirmed = search.confirmed(likely_points, runs).ok_or("no point can be confirmed")?;
-    progress("predictions");
+    search.begin("predictions".into());
     let mut random = search.random(best.level, 900);
     let points = likely.draws(&mut random);
     let facts = facts(search, dataset, &likely, &points, &confirmed, &mut remarks);
