@@ -125,6 +125,7 @@ int32_t bs_tree_add(bs_world *world, const bs_tree_body *bodies, int32_t count, 
       }
       btCollisionObject &collider = bs::add_collider(*world, body, link, shape, in_world.back(), i == 0 && from.mass == 0);
       collider.setFriction(from.friction);
+      if (i == 0 && from.mass == 0) collider.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
       body.frictions.push_back(from.friction);
       body.com_to_box.push_back(btVector3(0, 0, 0));
     }
