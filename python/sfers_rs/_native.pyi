@@ -24,6 +24,9 @@ __all__ = [
     "toml",
 ]
 
+#: The functions of sfers_rs.pybullet.
+pybullet: Any
+
 _Path = str | PathLike[str]
 _Found = tuple[str, str, list[tuple[str, str]]]
 
