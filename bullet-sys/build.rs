@@ -6,8 +6,20 @@ use std::path::{Path, PathBuf};
 /// The only Bullet that the shim is written for: snapshots reach into its data structures.
 const BULLET_VERSION: &str = "3.24";
 const DEBIAN_PACKAGE: &str = "libbullet-dev";
-const SOURCES: [&str; 7] = ["world.cpp", "multibody.cpp", "contact.cpp", "snapshot.cpp", "chain.cpp", "fixed.cpp", "solver.cpp"];
-const HEADERS: [&str; 7] = ["bullet_shim.h", "internal.h", "snapshot_state.h", "chain.h", "fixed.h", "solver.h", "impulse.h"];
+const SOURCES: [&str; 10] = [
+    "world.cpp",
+    "multibody.cpp",
+    "tree.cpp",
+    "reading.cpp",
+    "resume.cpp",
+    "contact.cpp",
+    "snapshot.cpp",
+    "chain.cpp",
+    "fixed.cpp",
+    "solver.cpp",
+];
+const HEADERS: [&str; 8] =
+    ["bullet_shim.h", "internal.h", "building.h", "snapshot_state.h", "chain.h", "fixed.h", "solver.h", "impulse.h"];
 
 fn main() {
     refuse_other_targets();

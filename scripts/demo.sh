@@ -16,3 +16,7 @@ mkdir -p target/demo
 echo
 echo "== The authors' fourteen recordings on PyBullet, compared bit by bit"
 "$sfers" crosscheck
+
+echo
+echo "== The Python wheel, built and installed into a fresh environment"
+bash scripts/wheel.sh

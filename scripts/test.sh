@@ -27,6 +27,9 @@ export SFERS_REQUIRE_TOOLS=1 SFERS_FUZZ_INPUTS=20000
 # The two left out are no tests: a worker of the fuzz tests, and the repetition of one input.
 cargo test --release --locked --workspace -- --include-ignored --skip worker_process --skip one_case
 
+step "the Python package: wheel, types, tests, notebooks"
+bash scripts/wheel.sh --test
+
 if $long; then
   step "shim under ASan, UBSan and TSan"
   bash scripts/sanitize.sh

@@ -21,7 +21,7 @@ extern "C" {
 /* ---- identity ------------------------------------------------------------------------------------------------------ */
 
 /* Raised whenever a signature, a structure or a constant of this header changes. */
-#define BS_ABI_VERSION 4
+#define BS_ABI_VERSION 5
 
 #define BS_OK 0
 #define BS_ERROR_ARGUMENT 1  /* a null pointer, a wrong length, an index out of range, a value that Bullet would assert on */
@@ -38,8 +38,8 @@ int32_t bs_bullet_version(void);
 /* The precision of the *linked* library, asked of the library itself: 8 (double), 4 (single) or 0 (unknown). */
 int32_t bs_linked_scalar_size(void);
 
-/* Layout of the structures below as the C++ compiler sees it: sizeof(bs_settings), sizeof(bs_link), sizeof(bs_contact), and
- * the offset of the last member of each. sizes: 6 values. */
+/* Layout of the structures below as the C++ compiler sees it: sizeof(bs_settings), sizeof(bs_link), sizeof(bs_contact),
+ * sizeof(bs_tree_body), and the offset of the last member of each. sizes: 8 values. */
 void bs_layout(int32_t *sizes, int32_t length);
 
 /* ---- world --------------------------------------------------------------------------------------------------------- */
@@ -161,6 +161,76 @@ int32_t bs_velocity_clamp(const bs_world *world, int32_t body, double *limit, do
 
 /* Sets that velocity (btMultiBody::setMaxCoordinateVelocity; 100 in a new body). limit: positive. */
 int32_t bs_velocity_clamp_set(bs_world *world, int32_t body, double limit);
+
+/* ---- trees in frames ----------------------------------------------------------------------------------------------- */
+
+/* What PyBullet's createMultiBody and loadURDF make, by the same operations in the same order. The states of a tree are set and read by the
+ * functions above, too. */
+
+#define BS_JOINT_REVOLUTE 0
+#define BS_JOINT_FIXED 4
+
+/* One body of a tree. Quaternions need not be of unit length. */
+typedef struct bs_tree_body {
+  double mass;                     /* (g); a base of mass 0 is fixed */
+  double position[3];              /* of the frame (cm), in the parent's frame; of the base: in the world */
+  double orientation[4];           /* of the frame */
+  double inertial_position[3];     /* of the centre of mass (cm), in this frame */
+  double inertial_orientation[4];  /* of the principal axes */
+  double half_extents[3];          /* of the box (cm), with has_box */
+  double box_position[3];          /* of the box's centre (cm), in this frame */
+  double box_orientation[4];
+  double axis[3];                  /* of a hinge, in this frame */
+  double friction;                 /* lateral friction of the collider (-) */
+  double collision_margin;         /* of the box (cm) */
+  double compound_margin;          /* of what holds a box that is not at the centre of mass (cm) */
+  int32_t parent;                  /* index of the parent link, -1 for the base */
+  int32_t joint;                   /* BS_JOINT_ */
+  int32_t has_box;                 /* 0 or 1 */
+  int32_t reserved;                /* 0 */
+} bs_tree_body;
+
+/* Adds a tree, at rest in its zero configuration. bodies: `count` entries, the base first, the links depth first. It has Bullet's linear and
+ * angular damping, and on every hinge a motor that holds its rate at 0 with at most `motor_impulse` (dyn cm s). */
+int32_t bs_tree_add(bs_world *world, const bs_tree_body *bodies, int32_t count, double motor_impulse, int32_t *body, char *error,
+                    int32_t error_length);
+
+/* Ties the base of `body` to the world with a 6-row constraint: `pivot` and `frame` (quaternion) in the base's frame to `world_pivot` and
+ * `world_frame`. */
+int32_t bs_anchor_add(bs_world *world, int32_t body, const double *pivot, const double *frame, const double *world_pivot,
+                      const double *world_frame, double max_impulse, char *error, int32_t error_length);
+
+/* Sets the motor of a hinge: rate (rad/s), share of the difference that a step removes (-), largest impulse (dyn cm s), 0 for off. */
+int32_t bs_motor_set(bs_world *world, int32_t body, int32_t link, double rate, double gain, double max_impulse);
+
+/* Reads the impulses (dyn cm s) that the motors gave last, 0 on a fixed joint. impulses: `length` values, one per link. */
+int32_t bs_motor_impulses(const bs_world *world, int32_t body, double *impulses, int32_t length);
+
+/* Adds torques (dyn cm) on some joints to those for the coming step; those on fixed joints are left out. links, torques: `length` values. */
+int32_t bs_joint_torques_add(bs_world *world, int32_t body, const int32_t *links, const double *torques, int32_t length);
+
+/* Sets lateral, spinning and rolling friction of the collider of `link` (-1: base). frictions: 3 values (-, cm, cm); a negative one is left. */
+int32_t bs_collider_frictions_set(bs_world *world, int32_t body, int32_t link, const double *frictions);
+
+/* Sets linear and angular damping of the body (1/s). dampings: 2 values; a negative one is left. */
+int32_t bs_dampings_set(bs_world *world, int32_t body, const double *dampings);
+
+/* Sets the damping of a joint (dyn cm s). */
+int32_t bs_joint_damping_set(bs_world *world, int32_t body, int32_t link, double damping);
+
+/* bs_base_state with the quaternion by way of the matrix, as PyBullet reads it. */
+int32_t bs_base_reading(const bs_world *world, int32_t body, double *state, int32_t length);
+
+/* Links, as cached by the last step, 20 values each: centre of mass (3, cm), quaternion of the principal axes by way of the matrix (4), as in
+ * bs_link_states velocity and angular velocity (6), 0 unless `with_velocities`; and the inertial frame in the link's frame, position (3, cm) and
+ * quaternion (4). */
+int32_t bs_link_readings(bs_world *world, int32_t body, int32_t with_velocities, double *states, int32_t length);
+
+/* What PyBullet keeps in a file: state of the bodies, and contact points. A world that is resumed has its transforms, boxes and pairs anew.
+ * The functions are like those of snapshots. */
+int32_t bs_resume_size(const bs_world *world, int32_t *size);
+int32_t bs_resume_take(const bs_world *world, double *data, int32_t length, char *error, int32_t error_length);
+int32_t bs_resume_from(bs_world *world, const double *data, int32_t length, char *error, int32_t error_length);
 
 /* ---- contacts ------------------------------------------------------------------------------------------------------ */
 

@@ -22,6 +22,10 @@ FixedConstraint::FixedConstraint(btMultiBody *body, const btTransform &world, co
       damping_time_(damping_time),
       hardening_(hardening) {}
 
+FixedConstraint::FixedConstraint(btMultiBody *body, const btVector3 &pivot, const btMatrix3x3 &frame, const btVector3 &world_pivot,
+                                 const btMatrix3x3 &world_frame)
+    : btMultiBodyFixedConstraint(body, BASE, static_cast<btRigidBody *>(nullptr), pivot, world_pivot, frame, world_frame) {}
+
 void FixedConstraint::bend(btScalar width, const btScalar *compliances) {
   width_ = width;
   for (int i = 0; i < BS_CLAMP_POINTS; ++i) compliances_[i] = compliances[i];

@@ -20,6 +20,9 @@ class FixedConstraint : public btMultiBodyFixedConstraint {
   FixedConstraint(btMultiBody *body, const btTransform &world);
   FixedConstraint(btMultiBody *body, const btTransform &world, const btVector3 &pivot, btScalar compliance,
                   btScalar damping_time, btScalar hardening);
+  // Ties `pivot` and `frame` of the base to `world_pivot` and `world_frame`.
+  FixedConstraint(btMultiBody *body, const btVector3 &pivot, const btMatrix3x3 &frame, const btVector3 &world_pivot,
+                  const btMatrix3x3 &world_frame);
   // Lets the compliance depend on the moment: `compliances` at multiples of `width` from 0, linear between them, constant beyond.
   void bend(btScalar width, const btScalar *compliances);
   bool is_bent() const { return width_ > 0; }

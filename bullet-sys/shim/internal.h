@@ -15,6 +15,7 @@
 #include "BulletCollision/CollisionShapes/btCompoundShape.h"
 #include "BulletDynamics/Featherstone/btMultiBody.h"
 #include "BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h"
+#include "BulletDynamics/Featherstone/btMultiBodyJointMotor.h"
 #include "BulletDynamics/Featherstone/btMultiBodyLinkCollider.h"
 
 #include "bullet_shim.h"
@@ -73,13 +74,20 @@ struct Body {
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::unique_ptr<btMultiBody> multibody;
   std::vector<std::unique_ptr<btMultiBodyLinkCollider>> colliders;
+  // Of the links of a tree; none on a fixed joint, none at all in a chain.
+  std::vector<std::unique_ptr<btMultiBodyJointMotor>> motors;
+  // Centre of mass and principal axes of the links of a tree, in each link's frame.
+  std::vector<btTransform> inertial_frames;
   // What the body was built with, of the base first.
   std::vector<double> frictions;
   std::vector<btVector3> com_to_box;
   bool has_offsets = false;  // whether any of com_to_box is not zero
+  bool has_damping = false;  // whether a joint has had a damping
 
   // Puts the colliders where the boxes are; Bullet puts them at the centres of mass.
   void move_colliders();
+  // Adds the torques of joint damping, which Bullet leaves to the caller, to those for the coming step.
+  void damp_joints();
 };
 
 inline btVector3 vector(const double *v) { return btVector3(v[0], v[1], v[2]); }

@@ -3,21 +3,17 @@
 #include <cmath>
 
 #include "BulletCollision/CollisionDispatch/btManifoldResult.h"
-#include "internal.h"
+#include "building.h"
 
 namespace {
 
 using bs::Body;
+using bs::Building;
+using bs::add_collider;
+using bs::box;
 using bs::require;
 
 bool is_finite(const double *v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
-
-std::unique_ptr<btBoxShape> box(const double *half_extents, double margin) {
-  for (int i = 0; i < 3; ++i) require(half_extents[i] > 0, "a half extent must be positive");
-  auto shape = std::make_unique<btBoxShape>(bs::vector(half_extents));
-  shape->setMargin(margin);
-  return shape;
-}
 
 btVector3 inertia_of(const btCollisionShape &shape, const bs_link &link) {
   btVector3 inertia = bs::vector(link.inertia);
@@ -25,67 +21,19 @@ btVector3 inertia_of(const btCollisionShape &shape, const bs_link &link) {
   return inertia;
 }
 
-// Makes the collider of `link` (-1: base), adds it to the world at `origin` and lists it in `body`.
-btMultiBodyLinkCollider &add_collider(bs_world &world, Body &body, int link, btCollisionShape &shape, const btVector3 &origin,
-                                      bool is_static) {
-  body.colliders.push_back(std::make_unique<btMultiBodyLinkCollider>(body.multibody.get(), link));
-  btMultiBodyLinkCollider &collider = *body.colliders.back();
-  collider.setCollisionShape(&shape);
+btTransform at(const btVector3 &origin) {
   btTransform transform;
   transform.setIdentity();
   transform.setOrigin(origin);
-  collider.setWorldTransform(transform);
-  const int group = is_static ? int(btBroadphaseProxy::StaticFilter) : int(btBroadphaseProxy::DefaultFilter);
-  const int mask = is_static ? int(btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter) : int(btBroadphaseProxy::AllFilter);
-  world.dynamics.addCollisionObject(&collider, group, mask);
-  if (link < 0) {
-    body.multibody->setBaseCollider(&collider);
-  } else {
-    body.multibody->getLink(link).m_collider = &collider;
-  }
-  return collider;
+  return transform;
 }
 
-// Last part of building: place the base, spread the transforms to the links and colliders, hand over to the world.
+// The body's last part, without damping.
 void finish(bs_world &world, Body &body, const btVector3 &base_position) {
-  btMultiBody &multibody = *body.multibody;
-  multibody.setHasSelfCollision(false);
-  multibody.finalizeMultiDof();
-  btTransform base;
-  base.setIdentity();
-  base.setOrigin(base_position);
-  multibody.setBaseWorldTransform(base);
-  btAlignedObjectArray<btQuaternion> scratch_rotations;
-  btAlignedObjectArray<btVector3> scratch_origins;
-  multibody.forwardKinematics(scratch_rotations, scratch_origins);
-  multibody.updateCollisionObjectWorldTransforms(scratch_rotations, scratch_origins);
-  body.move_colliders();
-  world.dynamics.addMultiBody(&multibody);
-  multibody.setLinearDamping(0);
-  multibody.setAngularDamping(0);
+  bs::finish(world, body, at(base_position));
+  body.multibody->setLinearDamping(0);
+  body.multibody->setAngularDamping(0);
 }
-
-// Takes a half-built body out of the world again when building fails on the way.
-class Building {
- public:
-  explicit Building(bs_world &world) : world_(world) { world.bodies.emplace_back(); }
-  ~Building() {
-    if (done_) return;
-    Body &body = world_.bodies.back();
-    if (body.multibody) world_.dynamics.removeMultiBody(body.multibody.get());
-    for (auto &collider : body.colliders) world_.dynamics.removeCollisionObject(collider.get());
-    world_.bodies.pop_back();
-  }
-  Body &body() { return world_.bodies.back(); }
-  int32_t commit() {
-    done_ = true;
-    return static_cast<int32_t>(world_.bodies.size()) - 1;
-  }
-
- private:
-  bs_world &world_;
-  bool done_ = false;
-};
 
 void check(const bs_link &link) {
   require(link.mass > 0, "a mass must be positive");
@@ -166,7 +114,7 @@ int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *li
     btMultiBody &multibody = *body.multibody;
     multibody.setBaseWorldTransform(btTransform::getIdentity());
     const btVector3 origin = bs::vector(base_position);
-    add_collider(*world, body, -1, *body.shapes[0], origin, false);
+    add_collider(*world, body, -1, *body.shapes[0], at(origin), false);
 
     // Where every body's frame stands so far, in the zero configuration: the base's centre of mass, then the joints. Summed from
     // frame to frame, as PyBullet does: by way of the centres of mass the last bit differs, and with it which neighbours' boxes
@@ -182,7 +130,7 @@ int32_t bs_multibody_add(bs_world *world, const bs_link *base, const bs_link *li
       const size_t parent = static_cast<size_t>(link.parent + 1);
       frames.push_back(frames[parent] + (to_centre[parent] + bs::vector(link.parent_com_to_joint)));
       to_centre.push_back(bs::vector(link.joint_to_com));
-      add_collider(*world, body, i, shape, frames.back(), false);
+      add_collider(*world, body, i, shape, at(frames.back()), false);
     }
     for (int32_t i = -1; i < link_count; ++i) {
       const bs_link &link = i < 0 ? *base : links[i];
@@ -220,7 +168,7 @@ int32_t bs_ground_add(bs_world *world, const double *half_extents, double top, d
     body.shapes.push_back(std::move(compound));
     body.multibody = std::make_unique<btMultiBody>(0, btScalar(0), btVector3(0, 0, 0), true, false);
     const btVector3 origin(0, 0, top);
-    add_collider(*world, body, -1, shape, origin, true);
+    add_collider(*world, body, -1, shape, at(origin), true);
     finish(*world, body, origin);
     body.colliders[0]->setFriction(friction);
     body.colliders[0]->setRestitution(restitution);

@@ -33,6 +33,9 @@ bs_world::~bs_world() {
   for (auto &constraint : constraints) dynamics.removeMultiBodyConstraint(constraint.get());
   constraints.clear();
   for (auto &body : bodies) {
+    for (auto &motor : body.motors) {
+      if (motor) dynamics.removeMultiBodyConstraint(motor.get());
+    }
     dynamics.removeMultiBody(body.multibody.get());
     for (auto &collider : body.colliders) dynamics.removeCollisionObject(collider.get());
   }
@@ -57,9 +60,15 @@ int32_t bs_linked_scalar_size(void) {
 }
 
 void bs_layout(int32_t *sizes, int32_t length) {
-  const size_t values[6] = {sizeof(bs_settings),         sizeof(bs_link),           sizeof(bs_contact),
-                            offsetof(bs_settings, reserved), offsetof(bs_link, reserved), offsetof(bs_contact, link_b)};
-  for (int32_t i = 0; i < 6 && i < length; ++i) sizes[i] = static_cast<int32_t>(values[i]);
+  const size_t values[8] = {sizeof(bs_settings),
+                            sizeof(bs_link),
+                            sizeof(bs_contact),
+                            sizeof(bs_tree_body),
+                            offsetof(bs_settings, reserved),
+                            offsetof(bs_link, reserved),
+                            offsetof(bs_contact, link_b),
+                            offsetof(bs_tree_body, reserved)};
+  for (int32_t i = 0; i < 8 && i < length; ++i) sizes[i] = static_cast<int32_t>(values[i]);
 }
 
 int32_t bs_world_create(const bs_settings *settings, bs_world **world, char *error, int32_t error_length) {
@@ -78,6 +87,7 @@ int32_t bs_world_step(bs_world *world, double time_step, char *error, int32_t er
     // Bullet takes a step within SIMD_EPSILON of zero for no step at all.
     bs::require(time_step > SIMD_EPSILON, "the time step must be above 2.2e-16 s");
     for (const auto &constraint : world->constraints) constraint->begin_step();
+    for (bs::Body &body : world->bodies) body.damp_joints();
     world->dynamics.stepSimulation(time_step, 0);
     for (bs::Body &body : world->bodies) body.move_colliders();
   });

@@ -2,20 +2,22 @@
 
 use std::mem::{offset_of, size_of};
 
-use bullet_sys::{BS_ABI_VERSION, bs_contact, bs_link, bs_settings};
+use bullet_sys::{BS_ABI_VERSION, bs_contact, bs_link, bs_settings, bs_tree_body};
 
 #[test]
 fn structures_have_the_layout_that_the_compiler_of_the_shim_sees() {
-    let mut sizes = [0; 6];
-    // SAFETY: the call writes at most 6 values.
-    unsafe { bullet_sys::bs_layout(sizes.as_mut_ptr(), 6) };
+    let mut sizes = [0; 8];
+    // SAFETY: the call writes at most 8 values.
+    unsafe { bullet_sys::bs_layout(sizes.as_mut_ptr(), 8) };
     let here = [
         size_of::<bs_settings>(),
         size_of::<bs_link>(),
         size_of::<bs_contact>(),
+        size_of::<bs_tree_body>(),
         offset_of!(bs_settings, reserved),
         offset_of!(bs_link, reserved),
         offset_of!(bs_contact, link_b),
+        offset_of!(bs_tree_body, reserved),
     ];
     assert_eq!(sizes.map(|size| usize::try_from(size).unwrap()), here);
 }

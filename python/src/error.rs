@@ -21,6 +21,9 @@ fn exception(class: &str, message: &str, attributes: &[(&str, Option<String>)]) 
     made.unwrap_or_else(|error| error)
 }
 
+/// Name of an experiment that is given as tables.
+pub const TABLES: &str = "the experiment";
+
 /// The number behind `line ` in a text.
 fn line_in(text: &str) -> Option<String> {
     let rest = &text[text.find("line ")? + 5..];
@@ -28,19 +31,31 @@ fn line_in(text: &str) -> Option<String> {
     (!digits.is_empty()).then_some(digits)
 }
 
+/// The key in a message that there is no such key.
+fn unknown_key_in(text: &str) -> Option<String> {
+    let rest = &text[text.find("there is no key ")? + 16..];
+    rest.split_whitespace().next().map(str::to_owned)
+}
+
 /// `ExperimentError` with `file`, `line` and `key`.
 pub fn of_config(error: &ConfigError) -> PyErr {
-    let message = error.to_string();
+    let mut message = error.to_string();
     let (file, key) = match error {
+        // A table has no lines.
+        ConfigError::Value { place, key, message: wrong } if place.starts_with(TABLES) => {
+            message = format!("{key}: {wrong}");
+            (String::new(), Some(key.clone()))
+        }
         ConfigError::Unreadable { path, .. } | ConfigError::Data { path, .. } => (path.display().to_string(), None),
-        ConfigError::Syntax { source_name, .. } => (source_name.clone(), None),
+        ConfigError::Syntax { source_name, message } => (source_name.clone(), unknown_key_in(message)),
         ConfigError::Value { place, key, .. } => {
             (place.split(", line ").next().unwrap_or_default().to_owned(), Some(key.clone()))
         }
         _ => (String::new(), None),
     };
     let line = line_in(message.strip_prefix(&file).unwrap_or(&message));
-    exception("ExperimentError", &message, &[("file", Some(file)), ("key", key), ("line", line)])
+    let file = (!file.is_empty() && file != TABLES).then_some(file);
+    exception("ExperimentError", &message, &[("file", file), ("key", key), ("line", line)])
 }
 
 /// `DataError`, or `ExperimentError` where the description is at fault.

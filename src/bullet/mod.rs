@@ -4,6 +4,8 @@
 //! by [`BodyId`]s, arrays of joint values travel whole, and every misuse is a [`BulletError`]. The step itself, the contacts and
 //! their impulses are Bullet's.
 //!
+//! [`World::add_tree`] makes bodies the way PyBullet's calls do, with frames, fixed joints and motors.
+//!
 //! Units are CGS throughout. Several of Bullet's constants are plain numbers whose meaning changes with the unit: the velocity
 //! clamp of 100 is 1 m/s for a base and 100 rad/s for a joint, and contacts are kept to a distance of 0.02 cm.
 //!
@@ -31,13 +33,16 @@ mod check;
 mod error;
 mod library;
 mod raw;
+mod resume;
 mod settings;
 mod snapshot;
 mod state;
+mod tree;
 mod world;
 
 pub use body::{BaseState, BodyId, BoxLink, Contact, Ground, LinkState, VelocityClamp, Wrench};
 pub use error::BulletError;
 pub use settings::SolverSettings;
 pub use snapshot::Snapshot;
+pub use tree::{LinkReading, Pose, TreeBody, TreeBox, TreeJoint};
 pub use world::World;

@@ -139,7 +139,7 @@ impl World {
         self.added(code, &message, body, 0)
     }
 
-    fn added(&mut self, code: i32, message: &Message, body: i32, links: usize) -> Result<BodyId, BulletError> {
+    pub(super) fn added(&mut self, code: i32, message: &Message, body: i32, links: usize) -> Result<BodyId, BulletError> {
         self.checked(code, message)?;
         self.link_counts.push(links);
         Ok(BodyId { world: self.id, index: body })

@@ -134,9 +134,15 @@ impl Space {
         Ok(experiment::experiment(&source)?)
     }
 
-    /// What an observation would be at a point; `None` if the run gives no measure.
-    pub fn predict(&self, nominal: &Config, observation: &Observation, point: &Point) -> Option<f64> {
+    /// What an observation would be at a point, with time steps of one length divided by `finer`; `None` if the run gives no measure.
+    pub fn predict(&self, nominal: &Config, observation: &Observation, point: &Point, finer: u64) -> Option<f64> {
         let mut experiment = self.experiment(nominal, observation, point).ok()?;
+        if experiment.accuracy.is_none() {
+            experiment.time_step /= finer as f64;
+            for steps in [&mut experiment.steps, &mut experiment.record_every, &mut experiment.record_from] {
+                *steps *= finer;
+            }
+        }
         experiment.record_only_what_measures_need(&[&observation.measure]);
         let mut engine = experiment.engine().ok()?;
         let run = experiment::run(&experiment, engine.as_mut(), |_| Control::Continue).ok()?;

@@ -9,8 +9,9 @@
 //!    until it shrinks no more (history matching; Craig et al. 1997). While even the best misses the numbers, χ² per degree of freedom above one, less is excluded
 //!    by that factor.
 //! 3. If the best misses the numbers by more than noise does once in a thousand, the basin was wrong: both again, CMA-ES from elsewhere. If it still does, there are no ranges.
-//! 4. The best points are confirmed by ensembles of runs.
-//! 5. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
+//! 4. Waves with a quarter of the time step, from where those of before ended: what long steps do to the numbers is nothing that constants should make up for.
+//! 5. The best points are confirmed by ensembles of runs.
+//! 6. Ranges by the profile likelihood, ties by the information matrix, what decides and what the rest foretells by leaving out each number, and which setting
 //!    of a similar measurement would be worth most.
 
 mod confirm;
@@ -37,7 +38,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use self::constants::Point;
-use self::emulator::{Emulator, coefficients};
+use self::emulator::{Emulator, Surface, coefficients};
 use self::profile::Likelihood;
 use self::region::Region;
 use super::DiagnoseError;
@@ -71,6 +72,8 @@ const WAVES: u64 = 10;
 const TRIALS: u64 = 3;
 /// A region that shrinks to no less than this share is the last.
 const SETTLED: f64 = 0.7;
+/// Divisor of the time step in the last waves.
+const FINER: u64 = 4;
 /// Probability of a smaller χ² by noise alone, up to which the numbers are met.
 const NOISE: f64 = 0.999;
 /// Residual (σ) of a number that no run gives.
@@ -81,6 +84,14 @@ const MISSING: f64 = 50.0;
 struct Run {
     point: Point,
     values: Vec<Option<f64>>,
+}
+
+/// Which waves: of a combination, in which search, with time steps divided by what, and whether another combination meets the numbers already.
+struct Stage {
+    level: usize,
+    search: u64,
+    finer: u64,
+    is_met_elsewhere: bool,
 }
 
 /// The search at work.
@@ -108,6 +119,8 @@ struct Found {
     best: (Vec<f64>, f64),
     /// False if the region still changed in the last wave.
     is_settled: bool,
+    /// What every number is more with finer steps, if there were waves with them.
+    moved: Vec<Option<f64>>,
 }
 
 /// Coordinates of a search without bounds within 0 to 1, and what is added to its objective for those beyond.
@@ -153,14 +166,21 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
         hopeful.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, level, region) in hopeful {
             let is_met = found.iter().any(|found| search.is_met(found));
-            found.extend(search.closely(level, at, region, is_met, &mut runs));
+            let stage = Stage { level, search: at, finer: 1, is_met_elsewhere: is_met };
+            found.extend(search.closely(&stage, region, &mut runs));
         }
         found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
         if space.constants.is_empty() || found.first().is_some_and(|best| search.is_met(best)) {
             break;
         }
     }
-    results::results(&search, dataset, &found, &runs)
+    let least = found.first().map_or(f64::INFINITY, |best| best.best.1);
+    let mut fine = Vec::new();
+    for found in found.iter_mut().filter(|found| found.best.1 <= least + KEPT) {
+        search.finely(found, &mut fine);
+    }
+    found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
+    results::results(&search, dataset, &found, &runs, fine.len())
 }
 
 impl Search<'_> {
@@ -170,17 +190,22 @@ impl Search<'_> {
         *self.task.lock().unwrap_or_else(PoisonError::into_inner) = task;
     }
 
-    /// What an observation would be at a point.
-    fn predict(&self, observation: &Observation, point: &Point) -> Option<f64> {
+    /// What an observation would be at a point, with time steps divided by `finer`.
+    fn predict(&self, observation: &Observation, point: &Point, finer: u64) -> Option<f64> {
         let task = self.task.lock().unwrap_or_else(PoisonError::into_inner).clone();
         (self.progress)(&task);
-        self.space.predict(self.nominal, observation, point)
+        self.space.predict(self.nominal, observation, point, finer)
     }
 
     /// What every fitted observation would be at the points, in parallel.
     fn evaluate(&self, points: Vec<Point>) -> Vec<Run> {
+        self.evaluate_with(points, 1)
+    }
+
+    /// The same with time steps divided by `finer`.
+    fn evaluate_with(&self, points: Vec<Point>, finer: u64) -> Vec<Run> {
         let run = |point: Point| {
-            let predict = |observation: &&Observation| self.predict(observation, &point);
+            let predict = |observation: &&Observation| self.predict(observation, &point, finer);
             let values = self.fitted.par_iter().map(predict).collect();
             Run { point, values }
         };
@@ -259,16 +284,24 @@ impl Search<'_> {
         runs.extend(seen);
     }
 
+    /// Waves with finer steps from where the others ended.
+    fn finely(&self, found: &mut Found, runs: &mut Vec<Run>) {
+        let region = found.emulator.region.clone();
+        let stage = Stage { level: found.level, search: SEARCHES, finer: FINER, is_met_elsewhere: false };
+        let Some(mut fine) = self.closely(&stage, region, runs) else { return };
+        let before = &found.emulator;
+        let moved = |(fine_surface, surface): (&Option<Surface>, &Option<Surface>)| {
+            let x = &fine.best.0;
+            Some(fine.emulator.at(fine_surface.as_ref()?, x).0 - before.at(surface.as_ref()?, x).0)
+        };
+        fine.moved = fine.emulator.surfaces.iter().zip(&before.surfaces).map(moved).collect();
+        *found = fine;
+    }
+
     /// Waves of runs in ever smaller regions around the likely points, at most a few if they miss the numbers and another combination meets them; `None` if they
     /// give no measures.
-    fn closely(
-        &self,
-        level: usize,
-        search: u64,
-        mut region: Region,
-        is_met_elsewhere: bool,
-        runs: &mut Vec<Run>,
-    ) -> Option<Found> {
+    fn closely(&self, stage: &Stage, mut region: Region, runs: &mut Vec<Run>) -> Option<Found> {
+        let Stage { level, search, finer, is_met_elsewhere } = *stage;
         let constants = self.space.constants.len();
         let mut found = None;
         for wave in 1..=WAVES {
@@ -277,7 +310,7 @@ impl Search<'_> {
             let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
             let fresh =
                 region.scattered(count.saturating_sub(inside).max(count / 2), &mut self.random(level, 100 * search + wave));
-            runs.extend(self.evaluate(fresh.into_iter().map(|x| Point { level, x }).collect()));
+            runs.extend(self.evaluate_with(fresh.into_iter().map(|x| Point { level, x }).collect(), finer));
             let own = || runs.iter().filter(|run| run.point.level == level);
             let emulator = Emulator::fit(region.clone(), own().map(|run| (&run.point.x[..], &run.values[..])), self.fitted.len());
             let likelihood = Likelihood { emulator: &emulator, observed: &self.observed, without: None };
@@ -300,7 +333,7 @@ impl Search<'_> {
                 }
             }
             let is_settled = !is_wider && next.volume() > SETTLED * region.volume();
-            let there = Found { level, emulator, best, is_settled };
+            let there = Found { level, emulator, best, is_settled, moved: Vec::new() };
             let is_left = is_met_elsewhere && wave >= TRIALS && !self.is_met(&there);
             found = Some(there);
             if is_settled || is_left || constants == 0 {

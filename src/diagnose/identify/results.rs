@@ -15,6 +15,7 @@ use super::emulator::Emulator;
 use super::profile::{Likelihood, RANGE};
 use super::{Found, Run, Search};
 use crate::experiment::Spread;
+use crate::number::signed;
 use crate::words::split_unit;
 
 /// Correlation from which on two constants are tied.
@@ -173,7 +174,7 @@ impl<'a> Likely<'a> {
 
     /// Mean of what an observation would be with the likely constants, its standard deviation by them, and the scatter about that; `None` if most runs fail.
     fn foretell(&self, search: &Search, observation: &Observation, points: &[Point]) -> Option<[f64; 3]> {
-        let values: Vec<Option<f64>> = points.par_iter().map(|point| search.predict(observation, point)).collect();
+        let values: Vec<Option<f64>> = points.par_iter().map(|point| search.predict(observation, point, 1)).collect();
         let there: Vec<(&Point, f64)> =
             points.iter().zip(&values).filter_map(|(point, value)| Some((point, (*value)?))).collect();
         let columns = self.found.best.0.len() + 1;
@@ -191,12 +192,13 @@ impl<'a> Likely<'a> {
     }
 }
 
-/// Builds the result from what was found for each hopeful combination.
+/// Builds the result from what was found for each hopeful combination, by `runs` and `fine` more with finer steps.
 pub(super) fn results(
     search: &Search,
     dataset: &Dataset,
     found: &[Found],
     runs: &[Run],
+    fine: usize,
 ) -> Result<Identification, DiagnoseError> {
     let Some(best) = found.first() else {
         return Err("no constants within the ranges give the measured numbers: every run fails, or most of them; widen [identify.vary], or simulate longer".into());
@@ -206,6 +208,15 @@ pub(super) fn results(
     let mut remarks = Vec::new();
     if possible.iter().any(|found| !found.is_settled) {
         remarks.push("the region of likely constants still changed in the last wave: ranges are not converged".into());
+    }
+    for (observation, moved) in search.fitted.iter().zip(&best.moved) {
+        if let Some(moved) = moved.filter(|moved| moved.abs() > observation.sigma) {
+            let named = format!("{} ({})", observation.measure, setting(observation));
+            remarks.push(format!(
+                "{named} changes by {} from the given time step to a quarter of it, which the ranges are of",
+                signed(moved, 3)
+            ));
+        }
     }
     let is_met = search.is_met(best);
     let (mut constants, mut corners) = constants_of(search, best, &possible);
@@ -254,7 +265,7 @@ pub(super) fn results(
         facts,
         corners,
         next,
-        simulated: runs.len(),
+        simulated: runs.len() + fine,
         remarks,
         file,
     };

@@ -1,0 +1,1 @@
+"""The part of pybullet_utils that the published simulator uses."""
