@@ -81,13 +81,15 @@ class Described:
             raise TypeError(f"predict of {type(plant).__name__} is a {type(plant.predict).__name__}, not a function of a model and a run")
         self.plant = plant
         self.channels = [_word(channel, "channel") for channel in plant.channels]
-        self.runs: list[Run] = list(plant.runs)
+        measured, proposals = list(plant.runs), list(getattr(plant, "proposals", ()))
+        #: The measured runs, then the proposed ones.
+        self.runs: list[Run] = measured + proposals
         self.unit = str(getattr(plant, "unit", ""))
         self.constants = list(getattr(plant, "constants", ()))
         self.candidates: list[Candidate] = [constant.candidate() for constant in self.constants] + list(plant.candidates)
         if not self.channels or len(set(self.channels)) < len(self.channels):
             raise ValueError(f"channels {self.channels}: one or more names are needed, each once")
-        if not self.runs:
+        if not measured:
             raise ValueError("the plant has no runs")
         ids = [_name(run.id, "the id of a run") for run in self.runs]
         if len(set(ids)) < len(ids):
@@ -101,7 +103,8 @@ class Described:
             "unit": self.unit,
             "channels": self.channels,
             "bench": self._bench(getattr(plant, "bench", {})),
-            "runs": [self._run(run) for run in self.runs],
+            "runs": [self._run(run, run.measured) for run in measured],
+            "proposals": [self._run(run, np.zeros((np.size(run.times_s), len(self.channels)))) for run in proposals],
             "candidates": [self._candidate(index, candidate) for index, candidate in enumerate(self.candidates)],
         }
 
@@ -116,7 +119,7 @@ class Described:
                 raise ValueError(f"bench[{name!r}] is a standard deviation, so not {spread!r}")
         return [spreads[name] for name in BENCH]
 
-    def _run(self, run: Run) -> dict[str, Any]:
+    def _run(self, run: Run, measured: Any) -> dict[str, Any]:
         of = f"run {run.id!r}"
         times = _array(run.times_s, f"{of}: times_s")
         if times.ndim != 1 or not len(times):
@@ -124,7 +127,7 @@ class Described:
         if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
             raise ValueError(f"{of}: times_s must rise and be finite; row {int(np.argmin(np.diff(times))) + 1 if len(times) > 1 else 0} does not")
         rows = len(times)
-        measured = _table(run.measured, self.channels, rows, f"{of}: measured")
+        measured = _table(measured, self.channels, rows, f"{of}: measured")
         used = np.isfinite(measured)
         if not used.any():
             raise ValueError(f"{of}: measured has no finite value, shape {measured.shape}")

@@ -177,7 +177,7 @@ class Run:
     Attributes:
         id: its name.
         times_s: rising times (s), shape (T,).
-        measured: shape (T, channels), or (T,) of one channel, or a dict from channel to (T,). NaN is a missing value.
+        measured: shape (T, channels), or (T,) of one channel, or a dict from channel to (T,). NaN is a missing value. None for a proposal.
         sigma: standard deviation of the noise, in the unit of the signals: a number, shape (channels,) or (T, channels), or a dict from channel to
             a number or (T,). Its size is checked against what the best model leaves.
         inputs: the input that drives the run, shape (T,), as a force or a voltage; tests of residuals look for it, and the choice of held-out runs.
@@ -190,7 +190,7 @@ class Run:
 
     id: str
     times_s: ArrayLike
-    measured: ArrayLike | Mapping[str, ArrayLike]
+    measured: ArrayLike | Mapping[str, ArrayLike] | None
     sigma: ArrayLike | Mapping[str, ArrayLike]
     inputs: ArrayLike | None = None
     role: Literal["auto", "fit", "held-out"] = "auto"
@@ -207,6 +207,8 @@ class Plant:
         channels: names of the signals, which all have the ``unit``.
         constants: of the nominal model, re-tuned first; may be empty.
         candidates: what may be missing.
+        proposals: runs that could be measured next, with None for what was measured. Where the data cannot tell causes apart, the one in which they differ
+            most becomes ``Diagnosis.next_experiment``.
         bench: standard deviations of faults that differ from run to run, by the names of :data:`BENCH`: None to estimate one, 0 for none. The
             default estimates scale, zero and drift, and has no others; those work only if ``predict`` asks ``model.times(run)`` and
             ``model.inputs(run)``.
@@ -219,6 +221,7 @@ class Plant:
     unit: str = ""
     constants: Sequence[Constant] = ()
     candidates: Sequence[Candidate] = ()
+    proposals: Sequence[Run] = ()
     bench: Mapping[str, float | None] = {}
     parallel: bool | Literal["processes", "threads"] = False
 

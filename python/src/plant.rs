@@ -18,6 +18,8 @@ use crate::service::{Call, Line, Predicted, Request, jobs, serve};
 /// Ends the ids of a plant's candidates, invisible, so that none is taken for a cause of this project's robots, to which reports give names of their
 /// own. It is taken out of every text.
 const MARK: char = '\u{2060}';
+/// Least distance of two models (σ, all values of a run together) that a measurement can tell.
+const LEAST_DISTANCE: f64 = 3.0;
 
 /// A text for as long as the process lives, as the library's names are: each is kept once.
 fn kept(text: &str) -> &'static str {
@@ -86,6 +88,14 @@ struct GivenCurve {
     x: Vec<f64>,
 }
 
+/// A run that could be measured next.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct GivenProposal {
+    id: String,
+    sigmas: Vec<f64>,
+}
+
 /// A plant as `sfers_rs/plant.py` describes it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -96,6 +106,8 @@ struct Given {
     /// Standard deviations of the bench's faults; none to estimate them.
     bench: [Option<f64>; KINDS],
     runs: Vec<GivenRun>,
+    /// Their indices go on from those of the runs.
+    proposals: Vec<GivenProposal>,
     candidates: Vec<GivenCandidate>,
 }
 
@@ -194,6 +206,27 @@ impl Plant for Remote<'_> {
     }
 }
 
+/// The proposal whose values differ most between the first model and the nearest of the others, in words; none without proposals or others.
+fn separate(plant: &Remote<'_>, proposals: &[GivenProposal], models: &[Model]) -> Option<String> {
+    let [first, others @ ..] = models else { return None };
+    let predict = |model: &Model, at: usize| plant.predict(model, plant.signals.len() + at, &Nuisance::default()).ok();
+    let distance = |at: usize| {
+        let here = predict(first, at)?;
+        let from = |other: &Model| {
+            let there = predict(other, at)?;
+            let differences = here.iter().zip(there).zip(&proposals[at].sigmas).map(|((a, b), sigma)| (a - b) / sigma);
+            Some(differences.map(|difference| difference * difference).sum::<f64>().sqrt())
+        };
+        others.iter().filter_map(from).min_by(f64::total_cmp)
+    };
+    let all = (0..proposals.len()).filter_map(|at| Some((at, distance(at)?)));
+    let (best, distance) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    if distance < LEAST_DISTANCE {
+        return Some("none of the proposed runs tells them apart".into());
+    }
+    Some(format!("measure the proposed run {}: the models then differ by {distance:.0} standard deviations", proposals[best].id))
+}
+
 /// Asks Python for a prediction: an array, or the reason why there is none.
 fn asked(predict: &Bound<'_, PyAny>, request: Request) -> PyResult<Predicted> {
     let Request { run, terms, fine, shares, base } = request;
@@ -220,7 +253,7 @@ pub fn diagnose_plant(
 ) -> PyResult<Found> {
     let concurrent = threads.map(|_| &predict);
     let threads = jobs(threads.or(Some(1)))?;
-    let Given { name, unit, channels, bench, runs, candidates } = given.extract()?;
+    let Given { name, unit, channels, bench, runs, proposals, candidates } = given.extract()?;
     let unit = kept(&unit);
     let starts: Vec<f64> = runs.iter().map(|run| run.start).collect();
     let kinds: Vec<(usize, bool)> = runs.iter().map(|run| (run.nuisances, run.moves_unaided)).collect();
@@ -264,7 +297,8 @@ pub fn diagnose_plant(
             concurrent,
         };
         let progress = |task: &str| line.progress(&without_mark(task));
-        let outcome = pipeline::diagnose(&plant, &name, &roles, Vec::new(), &progress, &|_| None)?;
+        let next = |models: &[Model]| separate(&plant, &proposals, models);
+        let outcome = pipeline::diagnose(&plant, &name, &roles, Vec::new(), &progress, &next)?;
         let page = report::page(&outcome, &report::Context { plant: &plant, constants: &[], command, extended: None });
         let residuals = extended::residuals(&plant, &outcome, "", &|run| starts[run]);
         Ok((serde_json::to_string_pretty(&outcome.diagnosis), page, residuals))

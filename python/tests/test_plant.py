@@ -76,6 +76,35 @@ def test_two_causes_that_do_the_same_are_tied():
     assert {found.effects[0].id, *found.effects[0].tied_with} == {"dry-friction", "brush-friction"}
 
 
+class Stuck(Carriage):
+    """Dry friction beside one that is rounded within 8 mm/s in place of 5: fast motion does not tell them apart."""
+
+    motions = [(0.3, 1.0), (0.2, 1.6), (0.25, 1.3), (0.35, 0.9), (0.3, 1.2), (0.2, 1.9)]
+    candidates = [
+        Candidate("dry-friction", [Parameter("force", bounds=(0.0, 10.0), unit="N")], place="speed"),
+        Candidate("soft-friction", [Parameter("force", bounds=(0.0, 10.0), unit="N")], place="film"),
+    ]
+    slow = Run("slow", np.arange(0.0, 20.0, 0.05), None, 0.05, inputs=np.zeros(400), data=(0.004, 0.2))
+    fast = Run("fast", np.arange(0.0, 4.0, 0.05), None, 0.05, inputs=np.zeros(80), data=(0.3, 2.0))
+    proposals = [fast, slow]
+
+    def predict(self, model, run):
+        v = self.motion(*run.data, np.asarray(run.times_s))[1]
+        return super().predict(model, run) + model.effect("soft-friction", "force") * np.tanh(v / 0.008)
+
+
+def test_the_proposal_that_tells_tied_causes_apart_is_next():
+    plant = Stuck(lambda x, v: 0.15 * friction(v))
+    found = diagnose_plant(plant)
+    assert found.verdict == "tied", found.summary
+    assert found.next_experiment.startswith("measure the proposed run slow: the models then differ by "), found.next_experiment
+    assert found.next_experiment in found.report
+    plant.proposals = [plant.fast]
+    assert diagnose_plant(plant, jobs=2).next_experiment == "none of the proposed runs tells them apart"
+    plant.proposals = []
+    assert diagnose_plant(plant).next_experiment is None
+
+
 def test_zeros_that_differ_from_run_to_run_are_the_benchs_and_no_cause():
     found = diagnose_plant(Carriage(dry, zeros=0.5))
     assert found.causes == ["dry-friction"], found.summary
@@ -226,6 +255,7 @@ class Point(Plant):
         ({"measured": np.zeros(4)}, ["run 'run 1'", "measured has the shape (4,)", "(5, 1) or (5,)"]),
         ({"measured": np.zeros((5, 2))}, ["measured has the shape (5, 2)"]),
         ({"measured": {"z": np.zeros(5)}}, ["channels ['z']", "['y']"]),
+        ({"measured": None}, ["measured has the shape ()", "(5, 1) or (5,)"]),
         ({"measured": np.full(5, np.nan)}, ["no finite value"]),
         ({"measured": ["a"] * 5}, ["no array of numbers"]),
         ({"times_s": np.zeros(5)}, ["times_s must rise"]),

@@ -3,6 +3,7 @@
 import json
 import random
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -14,7 +15,15 @@ import sfers_rs as sf
 
 NAMES = sorted(path.stem for path in RECORDINGS.glob("*.npz"))
 ARRAYS = ["dataTime", "dataTheta", "dataAngularVelocities", "dataTor", "dataMotorVoltages"]
+PLACES = ["dataPositions", "dataPositionVelocities"]
 REFERENCE = ROOT / "src" / "crosscheck" / "reference.py"
+
+
+def by_calls(specification: dict, out: Path, *python: str) -> dict:
+    """The recording of the script that makes the published simulator's calls, by a Python that has PyBullet, or by the drop-in."""
+    text = json.dumps(specification | {"out": str(out)})
+    subprocess.run([*python, REFERENCE], input=text, text=True, check=True, capture_output=True)
+    return np.load(out)
 
 
 def test_there_are_fourteen():
@@ -32,6 +41,14 @@ def test_a_recording_comes_out_bit_for_bit_from_its_file_and_from_its_tables(nam
     assert np.abs(recording["dataPositions"] - saved["dataPositions"]).max() < 1e-5
     tables = tomllib.loads(file.read_text())
     assert sf.resolved(tables) == sf.resolved(file)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_recording_comes_out_bit_for_bit_from_the_published_calls_on_the_drop_in(name, tmp_path):
+    saved = np.load(RECORDINGS / f"{name}.npz")
+    recording = by_calls(sf.resolved(RECORDINGS / f"{name}.toml"), tmp_path / "r.npz", sys.executable, "-m", "sfers_rs.pybullet")
+    for key in ARRAYS + PLACES:
+        assert np.array_equal(recording[key], saved[key]), key
 
 
 def robot_at_random(generator: random.Random) -> dict:
@@ -57,13 +74,16 @@ def robot_at_random(generator: random.Random) -> dict:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_robot_at_random_has_the_bits_of_pybullet(seed, pybullet_python, tmp_path):
+def test_a_robot_at_random_has_the_bits_of_pybullet_by_the_api_and_on_the_drop_in(seed, pybullet_python, tmp_path):
     tables = robot_at_random(random.Random(seed))
-    specification = sf.resolved(tables) | {"out": str(tmp_path / "reference.npz")}
-    subprocess.run([pybullet_python, REFERENCE], input=json.dumps(specification), text=True, check=True, capture_output=True)
-    recording, reference = sf.run(tables), np.load(tmp_path / "reference.npz")
+    specification = sf.resolved(tables)
+    reference = by_calls(specification, tmp_path / "reference.npz", pybullet_python)
+    on_drop_in = by_calls(specification, tmp_path / "r.npz", sys.executable, "-m", "sfers_rs.pybullet")
+    recording = sf.run(tables)
     for key in ARRAYS:
         assert np.array_equal(recording[key], reference[key]), key
+    for key in ARRAYS + PLACES:
+        assert np.array_equal(on_drop_in[key], reference[key]), key
 
 
 def test_recordings_are_saved_and_loaded_with_equal_arrays(tmp_path: Path):
