@@ -19,7 +19,7 @@ if $long; then packages+=(valgrind); fi
 bash scripts/debian.sh "${packages[@]}"
 bash scripts/python.sh
 
-step() { printf '\n== %s\n' "$*"; }
+step() { printf '\n== %s (after %d s)\n' "$*" "$SECONDS"; }
 
 step "tests"
 # A missing tool is an error here, not a skipped test.

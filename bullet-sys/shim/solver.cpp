@@ -31,7 +31,7 @@ bool Solver::read_chains(btPersistentManifold **manifolds, int manifold_count, c
   constexpr int OTHER_POINTS = BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP |
                                BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING | BT_CONTACT_FLAG_FRICTION_ANCHOR;
   chain_count_ = 0;
-  if (AS_SHIPPED || getenv("BS_PLAIN")) return false;
+  if (AS_SHIPPED) return false;
   if ((info.m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) == 0 || (info.m_solverMode & OTHER_MODES) != 0) return false;
   for (int i = 0; i < manifold_count; ++i) {
     const btPersistentManifold &manifold = *manifolds[i];
@@ -221,7 +221,7 @@ bool Solver::add_rows(const btMultiBodyConstraintArray &constraints, std::vector
 
 // Lists the rows of this solve; false if one is of a kind that is left to Bullet.
 bool Solver::prepare(const btContactSolverInfo &info) {
-  if (AS_SHIPPED || getenv("BS_PLAIN")) return false;
+  if (AS_SHIPPED) return false;
   const bool cone = (info.m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) != 0 &&
                     (info.m_solverMode & SOLVER_DISABLE_IMPLICIT_CONE_FRICTION) == 0;
   if (m_multiBodySpinningFrictionContactConstraints.size() != 0 || m_multiBodyTorsionalFrictionContactConstraints.size() != 0) return false;

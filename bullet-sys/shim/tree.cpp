@@ -59,6 +59,16 @@ btVector3 inertia_of(const btCollisionShape &shape, double mass) {
   return inertia;
 }
 
+// Whether PyBullet takes a link of a fixed base for static, and leaves out its contacts with others that are: where fixed joints lead back to
+// the base. It does not look at the joint of link 0 on the way, so that what is fixed to that link counts, too.
+bool is_static(const btMultiBody &body, int link) {
+  do {
+    if (link >= 0 && body.getLink(link).m_jointType != btMultibodyLink::eFixed) return false;
+    link = link >= 0 ? body.getParent(link) : -1;
+  } while (link > 0);
+  return true;
+}
+
 void add_motors(bs_world &world, Body &body, double impulse) {
   btMultiBody &multibody = *body.multibody;
   for (int i = 0; i < multibody.getNumLinks(); ++i) {
@@ -125,6 +135,7 @@ int32_t bs_tree_add(bs_world *world, const bs_tree_body *bodies, int32_t count, 
       }
       btCollisionObject &collider = bs::add_collider(*world, body, link, shape, in_world.back(), i == 0 && from.mass == 0);
       collider.setFriction(from.friction);
+      if (bodies[0].mass == 0 && is_static(*body.multibody, link)) collider.setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
       body.frictions.push_back(from.friction);
       body.com_to_box.push_back(btVector3(0, 0, 0));
     }

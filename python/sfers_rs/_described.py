@@ -203,7 +203,8 @@ class Described:
                 constants[candidate.id] = values[0]
             else:
                 effects[candidate.id] = dict(candidate.fixed) | {p.name: value for p, value in zip(candidate.parameters, values)}
-        return Model(constants, effects, fine, *base, tuple(shares))
+        clock, rate, gain = base
+        return Model(constants, effects, fine, clock, rate, gain, tuple(shares))
 
     def predict(self, run: int, terms: Any, fine: bool, shares: Any, base: Any) -> np.ndarray | str:
         """The predicted values of a run in the order of its measured ones, or why the model cannot be simulated.

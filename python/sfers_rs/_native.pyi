@@ -24,7 +24,11 @@ __all__ = [
     "toml",
 ]
 
+#: The functions of sfers_rs.pybullet.
+pybullet: Any
+
 _Path = str | PathLike[str]
+_Found = tuple[str, str, list[tuple[str, str]]]
 
 @final
 class Experiment:
@@ -121,14 +125,12 @@ def run_sweep(
     jobs: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[str, int, int, int]: ...
-def diagnose(
-    dataset: str, command: str, threads: int | None = None, progress: Callable[[str], Any] | None = None
-) -> tuple[str, str, list[tuple[str, str]]]: ...
+def diagnose(dataset: str, command: str, threads: int | None = None, progress: Callable[[str], Any] | None = None) -> _Found: ...
 def diagnose_plant(
-    given: Any,
+    given: dict[str, Any],
     command: str,
-    predict: Callable[..., Any],
-    stopped: Any,
+    predict: Callable[[int, list[tuple[int, list[float]]], bool, list[float], list[float]], np.ndarray | str],
+    stopped: Callable[[], Any],
     threads: int | None = None,
     progress: Callable[[str], Any] | None = None,
-) -> tuple[str, str, list[tuple[str, str]]]: ...
+) -> _Found: ...

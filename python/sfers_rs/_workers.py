@@ -57,7 +57,7 @@ class Workers:
     def __init__(self, described: Described, count: int):
         context = _context(described)
         self._idle: queue.SimpleQueue[tuple[Any, Connection]] = queue.SimpleQueue()
-        self._all = []
+        self._all: list[tuple[Any, Connection]] = []
         for _ in range(count):
             ours, theirs = context.Pipe()
             ends = [line for _, line in self._all] + [ours] if context.get_start_method() == "fork" else []

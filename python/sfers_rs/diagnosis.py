@@ -67,7 +67,8 @@ class Effect:
     @classmethod
     def _of(cls, effect: Mapping[str, Any]) -> Effect:
         def estimate(p: Mapping[str, Any]) -> Estimate:
-            return Estimate(p["name"], p["value"], p["unit"], *p["ci95"], p["at_bound"])
+            low, high = p["ci95"]
+            return Estimate(p["name"], p["value"], p["unit"], low, high, p["at_bound"])
 
         parameters = {p["name"]: estimate(p) for p in effect["parameters"]}
         return cls(**{name: effect[name] for name in cls.__dataclass_fields__ if name != "parameters"}, parameters=parameters)

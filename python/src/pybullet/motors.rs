@@ -13,10 +13,8 @@ pub const VELOCITY_CONTROL: i32 = 0;
 /// PyBullet's number of control by torque.
 pub const TORQUE_CONTROL: i32 = 1;
 
-/// PyBullet's largest torque of one motor, unless another is given.
+/// PyBullet's largest torque of a motor, unless another is given.
 const MOTOR_TORQUE: f64 = 100_000.0;
-/// The same of a list of motors.
-const MOTORS_TORQUE: f64 = 1_000_000.0;
 /// Share of a difference of rates that a motor removes in one step, unless another is given.
 const MOTOR_GAIN: f64 = 1.0;
 
@@ -135,7 +133,7 @@ fn setJointMotorControlArray(
     }
     let rates = list("targetVelocities", targetVelocities, 0.0)?;
     let gains = list("velocityGains", velocityGains, MOTOR_GAIN)?;
-    let torques = list("forces", forces, MOTORS_TORQUE)?;
+    let torques = list("forces", forces, MOTOR_TORQUE)?;
     if let Some(torque) = torques.iter().find(|torque| **torque < 0.0) {
         return Err(refuse(format!("forces has {torque}, but a motor's must not be negative")));
     }

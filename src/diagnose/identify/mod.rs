@@ -166,8 +166,7 @@ pub fn identify(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<I
         hopeful.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, level, region) in hopeful {
             let is_met = found.iter().any(|found| search.is_met(found));
-            let stage = Stage { level, search: at, finer: 1, is_met_elsewhere: is_met };
-            found.extend(search.closely(&stage, region, &mut runs));
+            found.extend(search.closely(&Stage { level, search: at, finer: 1, is_met_elsewhere: is_met }, region, &mut runs));
         }
         found.sort_by(|a, b| a.best.1.total_cmp(&b.best.1));
         if space.constants.is_empty() || found.first().is_some_and(|best| search.is_met(best)) {
@@ -305,7 +304,8 @@ impl Search<'_> {
         let constants = self.space.constants.len();
         let mut found = None;
         for wave in 1..=WAVES {
-            self.begin(format!("wave {wave} around the best, {} runs so far", runs.len()));
+            let steps = if finer > 1 { " with finer steps" } else { "" };
+            self.begin(format!("wave {wave}{steps} around the best, {} runs so far", runs.len()));
             let count = LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants));
             let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
             let fresh =
