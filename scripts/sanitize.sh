@@ -10,7 +10,7 @@ mkdir -p "$out"
 # Bullet's headers are not free of warnings, hence -isystem.
 read -ra flags <<<"$(pkg-config --cflags bullet-float64 | sed 's/-I *\([^ ]*\)/-isystem \1/g')"
 read -ra libraries <<<"$(pkg-config --libs bullet-float64)"
-sources=(bullet-sys/shim/*.cpp bullet-sys/tests/shim.cpp)
+sources=(bullet-sys/shim/*.cpp bullet-sys/tests/shim.cpp bullet-sys/tests/trees.cpp)
 
 build() { # name, then the sanitizer's flags
   local name=$1

@@ -13,6 +13,9 @@
 #include "../shim/bullet_shim.h"
 #include "../shim/impulse.h"
 
+// In trees.cpp.
+int random_trees(int calls);
+
 namespace {
 
 std::atomic<int> passed{0}, failed{0};
@@ -169,12 +172,12 @@ void identity() {
   CHECK(bs_scalar_size() == 8);
   CHECK(bs_linked_scalar_size() == 8);
   CHECK(bs_bullet_version() == 324);
-  int32_t sizes[6] = {-1, -1, -1, -1, -1, -1};
+  int32_t sizes[8] = {-1, -1, -1, -1, -1, -1, -1, -1};
   bs_layout(sizes, 3);
   CHECK(sizes[2] == int32_t(sizeof(bs_contact)) && sizes[3] == -1);
-  bs_layout(sizes, 6);
+  bs_layout(sizes, 8);
   CHECK(sizes[0] == int32_t(sizeof(bs_settings)) && sizes[1] == int32_t(sizeof(bs_link)));
-  CHECK(sizes[5] == int32_t(offsetof(bs_contact, link_b)));
+  CHECK(sizes[6] == int32_t(offsetof(bs_contact, link_b)) && sizes[7] == int32_t(offsetof(bs_tree_body, reserved)));
 }
 
 void misuse() {
@@ -632,6 +635,7 @@ int main() {
   foreign_snapshots();
   impulses();
   threads();
+  CHECK(random_trees(10000) == 0);
   std::printf("%d passed, %d failed\n", passed.load(), failed.load());
   return failed == 0 ? 0 : 1;
 }
