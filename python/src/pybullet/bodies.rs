@@ -345,7 +345,14 @@ fn createConstraint(
     })
 }
 
+/// The link that a call of changeDynamics means. PyBullet's linearDamping, angularDamping and maxJointVelocity are of the whole body: given in the
+/// same call they turn it to the base, with its frictions; jointDamping turns it back to the link, where it comes after them.
+fn meant(link: i32, dampings: bool, joint_damping: bool, limit: bool) -> i32 {
+    if limit || (dampings && !joint_damping) { -1 } else { link }
+}
+
 /// Changes frictions of a link (-1: the base), dampings and the limit of the velocities. A link that is not there is left alone, as PyBullet does.
+/// With linearDamping or angularDamping and no jointDamping, or with maxJointVelocity, the frictions are the base's, as in PyBullet.
 #[pyfunction]
 #[pyo3(signature = (
     bodyUniqueId, linkIndex, *, lateralFriction=None, spinningFriction=None, rollingFriction=None, linearDamping=None,
@@ -384,7 +391,8 @@ fn changeDynamics(
         if let Some(limit) = limit {
             world.set_velocity_clamp(id, limit).map_err(refused("maxJointVelocity"))?;
         }
-        let link = usize::try_from(link).ok();
+        let whole = dampings.iter().any(Option::is_some);
+        let link = usize::try_from(meant(link, whole, joint_damping.is_some(), limit.is_some())).ok();
         if link.is_some_and(|link| link >= links) {
             return Ok(());
         }
