@@ -345,6 +345,21 @@ def test_pytest_runs_on_it(tmp_path):
     assert "1 passed" in run([*DROP_IN, "-m", "pytest", "-q", "-p", "no:cacheprovider"], cwd=tmp_path).stdout
 
 
+def test_the_version_of_pybullet_is_known():
+    code = "import importlib.metadata as m; print(m.version('pybullet'))"
+    assert run([*DROP_IN, "-c", code]).stdout.strip() == "3.2.7"
+
+
+def test_the_limit_of_velocities_is_the_bodys_even_by_a_link_that_is_not_there(client):
+    body = make(client)
+    p.changeDynamics(body, 9, maxJointVelocity=0.25, physicsClientId=client)
+    for joint in range(2):
+        p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=0, physicsClientId=client)
+    p.setJointMotorControl2(body, 1, p.TORQUE_CONTROL, force=100, physicsClientId=client)
+    p.stepSimulation(physicsClientId=client)
+    assert p.getJointState(body, 1, physicsClientId=client)[1] == 0.25
+
+
 def test_the_floor_is_pybullets(client):
     p.setAdditionalSearchPath(pybullet_data.getDataPath(), physicsClientId=client)
     assert p.loadURDF("plane.urdf", [0, 0, -0.05], globalScaling=10.0, physicsClientId=client) == 0
