@@ -83,7 +83,7 @@ def two_in_a_world():
     """Two robots that lie on one another."""
     p.connect(p.DIRECT)
     first, second = chain(3), chain(3)
-    return [advance(first, 3, 2) + advance(second, 3, 2) for _ in range(60)]
+    return [advance(first, 3, 2) + advance(second, 3, 2) for _ in range(100)]
 
 
 def saved():
@@ -130,7 +130,7 @@ def shape(draw):
     return p.createCollisionShape(p.GEOM_BOX, **frame)
 
 
-def random_tree(draw, mass, floor):
+def random_tree(draw, mass):
     """A tree of boxes in odd frames: its id and its number of links."""
     links = draw.randint(1, 8)
     turned = draw.random() < 0.6
@@ -144,7 +144,7 @@ def random_tree(draw, mass, floor):
         mass,
         shape(draw),
         -1,
-        [draw.uniform(-1, 1), draw.uniform(-1, 1), draw.uniform(0.5, 1.5) if floor else 0],
+        [draw.uniform(-1, 1), draw.uniform(-1, 1), draw.uniform(0.1, 1.2)],
         turn(),
         linkMasses=[draw.uniform(0.2, 3) for _ in range(links)],
         linkCollisionShapeIndices=[shape(draw) if draw.random() < 0.85 else -1 for _ in range(links)],
@@ -185,20 +185,21 @@ DYNAMICS = {
 
 
 def trees():
-    """Random trees, free on the floor, or fixed in the air."""
+    """Random trees, free or fixed, most with a floor."""
     read = []
-    for seed in range(60):
+    for seed in range(100):
         draw = random.Random(seed)
         p.connect(p.DIRECT)
         fixed = draw.random() < 0.3
-        body, links = random_tree(draw, 0 if fixed else draw.uniform(0.5, 3), not fixed)
+        floor = draw.random() < 0.8
+        body, links = random_tree(draw, 0 if fixed else draw.uniform(0.5, 3))
         p.setTimeStep(draw.choice([1 / 240, 0.001]))
         p.setGravity(draw.uniform(-1, 1), 0, -9.8)
         off = control(draw, body, links)
-        if not fixed:
+        if floor:
             p.loadURDF(os.path.join(pybullet_data.getDataPath(), "plane.urdf"), globalScaling=draw.choice([1.0, 10.0]))
         for link in range(-1, links):
-            changed = {key: draw.uniform(0, most) for key, most in DYNAMICS.items() if draw.random() < 0.2}
+            changed = {key: draw.uniform(0, most) for key, most in DYNAMICS.items() if draw.random() < 0.3}
             p.changeDynamics(body, link, **changed)
         if draw.random() < 0.3:
             p.changeDynamics(body, -1, maxJointVelocity=3.0)

@@ -61,13 +61,15 @@ def __getattr__(name: str) -> NoReturn:
 
 def install() -> None:
     """Makes `import pybullet`, `pybullet_utils.bullet_client` and `pybullet_data` find this drop-in, in this process and its forks."""
-    from . import pybullet_data, pybullet_utils
+    from . import metadata, pybullet_data, pybullet_utils
     from .pybullet_utils import bullet_client
 
     sys.modules["pybullet"] = sys.modules[__name__]
     sys.modules["pybullet_data"] = pybullet_data
     sys.modules["pybullet_utils"] = pybullet_utils
     sys.modules["pybullet_utils.bullet_client"] = bullet_client
+    if not any(isinstance(finder, metadata.Finder) for finder in sys.meta_path):
+        sys.meta_path.append(metadata.Finder())
 
 
 __all__ += ["NotProvided", "install"]

@@ -1,4 +1,4 @@
-//! Making bodies and constraints, and changing what they are made of.
+//! Making bodies.
 // Names are PyBullet's.
 #![allow(non_snake_case)]
 
@@ -24,8 +24,6 @@ const MOST_LINKS: usize = 127;
 const COLLISION_MARGIN: f64 = 0.001;
 /// Largest impulse of the motor that PyBullet puts on every hinge.
 const MOTOR_IMPULSE: f64 = 1.0;
-/// Largest impulse of a constraint that PyBullet makes.
-const CONSTRAINT_IMPULSE: f64 = 500.0;
 /// Lateral friction of bodies that are made by calls.
 const FRICTION: f64 = 0.5;
 /// Half extents of the box in plane.urdf, whose upper face lies at 0, before scaling.
@@ -302,104 +300,8 @@ fn loadURDF(
     })
 }
 
-/// Ties the base of a body to the world and returns the constraint's id.
-#[pyfunction]
-#[pyo3(signature = (
-    parentBodyUniqueId, parentLinkIndex, childBodyUniqueId, childLinkIndex, jointType, jointAxis, parentFramePosition,
-    childFramePosition, parentFrameOrientation=None, childFrameOrientation=None, physicsClientId=0
-))]
-#[allow(clippy::too_many_arguments)]
-fn createConstraint(
-    parentBodyUniqueId: &Bound<'_, PyAny>,
-    parentLinkIndex: &Bound<'_, PyAny>,
-    childBodyUniqueId: &Bound<'_, PyAny>,
-    childLinkIndex: &Bound<'_, PyAny>,
-    jointType: &Bound<'_, PyAny>,
-    jointAxis: &Bound<'_, PyAny>,
-    parentFramePosition: &Bound<'_, PyAny>,
-    childFramePosition: &Bound<'_, PyAny>,
-    parentFrameOrientation: Option<&Bound<'_, PyAny>>,
-    childFrameOrientation: Option<&Bound<'_, PyAny>>,
-    physicsClientId: i32,
-) -> PyResult<i32> {
-    let body = integer("parentBodyUniqueId", parentBodyUniqueId)?;
-    for (name, value, only) in [
-        ("parentLinkIndex", integer("parentLinkIndex", parentLinkIndex)?, -1),
-        ("childBodyUniqueId", integer("childBodyUniqueId", childBodyUniqueId)?, -1),
-        ("childLinkIndex", integer("childLinkIndex", childLinkIndex)?, -1),
-        ("jointType", integer("jointType", jointType)?, JOINT_FIXED),
-    ] {
-        if value != only {
-            let what = "this drop-in ties a base to the world by JOINT_FIXED only";
-            return Err(refuse(format!("createConstraint failed: {name} is {value}, but {what}")));
-        }
-    }
-    numbers::<3>("jointAxis", jointAxis)?;
-    let pivot = pose(["parentFramePosition", "parentFrameOrientation"], Some(parentFramePosition), parentFrameOrientation)?;
-    let place = pose(["childFramePosition", "childFrameOrientation"], Some(childFramePosition), childFrameOrientation)?;
-    with(physicsClientId, |client| {
-        let body = client.body(body)?.id;
-        client.world.add_anchor(body, &pivot, &place, CONSTRAINT_IMPULSE).map_err(refused("createConstraint"))?;
-        client.constraints += 1;
-        Ok(client.constraints)
-    })
-}
-
-/// Changes frictions of a link (-1: the base), dampings and the limit of the velocities. A link that is not there is left alone, as PyBullet does.
-#[pyfunction]
-#[pyo3(signature = (
-    bodyUniqueId, linkIndex, *, lateralFriction=None, spinningFriction=None, rollingFriction=None, linearDamping=None,
-    angularDamping=None, jointDamping=None, maxJointVelocity=None, physicsClientId=0
-))]
-#[allow(clippy::too_many_arguments)]
-fn changeDynamics(
-    bodyUniqueId: &Bound<'_, PyAny>,
-    linkIndex: &Bound<'_, PyAny>,
-    lateralFriction: Option<&Bound<'_, PyAny>>,
-    spinningFriction: Option<&Bound<'_, PyAny>>,
-    rollingFriction: Option<&Bound<'_, PyAny>>,
-    linearDamping: Option<&Bound<'_, PyAny>>,
-    angularDamping: Option<&Bound<'_, PyAny>>,
-    jointDamping: Option<&Bound<'_, PyAny>>,
-    maxJointVelocity: Option<&Bound<'_, PyAny>>,
-    physicsClientId: i32,
-) -> PyResult<()> {
-    let (body, link) = (integer("bodyUniqueId", bodyUniqueId)?, integer("linkIndex", linkIndex)?);
-    if link < -1 {
-        return Err(refuse(format!("linkIndex is {link}, but the base is -1")));
-    }
-    let given = |name, value: Option<&Bound<'_, PyAny>>| value.map(|value| not_negative(name, value)).transpose();
-    let frictions = [
-        given("lateralFriction", lateralFriction)?,
-        given("spinningFriction", spinningFriction)?,
-        given("rollingFriction", rollingFriction)?,
-    ];
-    let dampings = [given("linearDamping", linearDamping)?, given("angularDamping", angularDamping)?];
-    let joint_damping = given("jointDamping", jointDamping)?;
-    let limit = maxJointVelocity.map(|value| positive("maxJointVelocity", value)).transpose()?;
-    with(physicsClientId, |client| {
-        let (id, links) = client.body(body).map(|body| (body.id, body.links))?;
-        let world = &mut client.world;
-        world.set_dampings(id, dampings).map_err(refused("changeDynamics"))?;
-        if let Some(limit) = limit {
-            world.set_velocity_clamp(id, limit).map_err(refused("maxJointVelocity"))?;
-        }
-        let link = usize::try_from(link).ok();
-        if link.is_some_and(|link| link >= links) {
-            return Ok(());
-        }
-        world.set_collider_frictions(id, link, frictions).map_err(refused("changeDynamics"))?;
-        match (link, joint_damping) {
-            (Some(link), Some(damping)) => world.set_joint_damping(id, link, damping).map_err(refused("jointDamping")),
-            _ => Ok(()),
-        }
-    })
-}
-
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(createCollisionShape, module)?)?;
     module.add_function(wrap_pyfunction!(createMultiBody, module)?)?;
-    module.add_function(wrap_pyfunction!(loadURDF, module)?)?;
-    module.add_function(wrap_pyfunction!(createConstraint, module)?)?;
-    module.add_function(wrap_pyfunction!(changeDynamics, module)?)
+    module.add_function(wrap_pyfunction!(loadURDF, module)?)
 }

@@ -7,6 +7,7 @@
 
 mod arguments;
 mod bodies;
+mod changes;
 mod clients;
 mod motors;
 mod readings;
@@ -45,6 +46,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     }
     clients::register(module)?;
     bodies::register(module)?;
+    changes::register(module)?;
     motors::register(module)?;
     readings::register(module)
 }
