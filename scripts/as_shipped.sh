@@ -10,7 +10,9 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 cargo build --release --locked --bin sfers
-cargo build --release --locked --bin sfers --features bullet-as-shipped --target-dir target/as-shipped
+# Without optimisation, which changes no bits and takes minutes.
+CARGO_PROFILE_RELEASE_OPT_LEVEL=0 CARGO_PROFILE_RELEASE_DEBUG=0 \
+  cargo build --release --locked --bin sfers --features bullet-as-shipped --target-dir target/as-shipped
 for preset in cantilever-dc jump-14hz full-frictional-inchworm; do
   for build in target/release target/as-shipped/release; do
     "$build/sfers" preset "$preset" \

@@ -72,8 +72,9 @@ const WAVES: u64 = 10;
 const TRIALS: u64 = 3;
 /// A region that shrinks to no less than this share is the last.
 const SETTLED: f64 = 0.7;
-/// Divisor of the time step in the last waves.
+/// Divisor of the time step in the last waves, which cost as much more, and their runs per coefficient.
 const FINER: u64 = 4;
+const FINE_RUNS_PER_COEFFICIENT: usize = 6;
 /// Probability of a smaller χ² by noise alone, up to which the numbers are met.
 const NOISE: f64 = 0.999;
 /// Residual (σ) of a number that no run gives.
@@ -306,7 +307,10 @@ impl Search<'_> {
         for wave in 1..=WAVES {
             let steps = if finer > 1 { " with finer steps" } else { "" };
             self.begin(format!("wave {wave}{steps} around the best, {} runs so far", runs.len()));
-            let count = LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants));
+            let count = match finer {
+                1 => LEAST_RUNS.max(RUNS_PER_COEFFICIENT * coefficients(constants)),
+                _ => FINE_RUNS_PER_COEFFICIENT * coefficients(constants),
+            };
             let inside = runs.iter().filter(|run| run.point.level == level && region.holds(&run.point.x)).count();
             let fresh =
                 region.scattered(count.saturating_sub(inside).max(count / 2), &mut self.random(level, 100 * search + wave));
