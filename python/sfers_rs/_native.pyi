@@ -20,6 +20,7 @@ __all__ = [
     "key_tables",
     "preset",
     "presets",
+    "pybullet",
     "run_sweep",
     "toml",
 ]
