@@ -28,6 +28,6 @@ if $tests; then
   .venv/bin/python -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel"
   .venv/bin/python -m mypy.stubtest sfers_rs._native
   (cd target && ../.venv/bin/python -m mypy --package sfers_rs)
-  (cd python/tests && ../../.venv/bin/python -m pytest --quiet --no-header -p no:cacheprovider .)
+  (cd python/tests && ../../.venv/bin/python -m pytest --quiet --no-header --numprocesses 2 --dist worksteal -p no:cacheprovider .)
   .venv/bin/python -m pdoc --output-directory target/python-reference sfers_rs 2>/dev/null
 fi
