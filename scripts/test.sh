@@ -14,7 +14,7 @@ long=false
 if [ "${1:-}" = --long ] || [ "${CI:-}" = true ]; then long=true; fi
 export SFERS_LONG=0
 if [ "${1:-}" = --hidden ]; then SFERS_LONG=1; fi
-packages=(build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv chromium)
+packages=(build-essential pkg-config libbullet-dev libclang-14-dev python3 python3-venv chromium slurmctld slurmd slurm-client munge)
 if $long; then packages+=(valgrind); fi
 bash scripts/debian.sh "${packages[@]}"
 bash scripts/python.sh

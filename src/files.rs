@@ -53,10 +53,14 @@ fn text(bytes: Vec<u8>) -> io::Result<String> {
     })
 }
 
-/// A digest to detect changes: 64-bit FNV-1a and the length. It is not cryptographic.
+/// 64-bit FNV-1a, to detect changes. It is not cryptographic.
+pub(crate) fn fnv1a(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+/// A digest to detect changes: [`fnv1a`] and the length.
 pub(crate) fn digest(bytes: &[u8]) -> String {
-    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3));
-    format!("{hash:016x}, {} bytes", bytes.len())
+    format!("{:016x}, {} bytes", fnv1a(bytes), bytes.len())
 }
 
 /// True if a locking error means that the file system has no locks (ENOTSUP, ENOSYS, ENOLCK), as Lustre without flock.

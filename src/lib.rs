@@ -69,6 +69,7 @@ pub mod bullet;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod crosscheck;
+mod date;
 pub mod diagnose;
 pub mod drive;
 pub mod effects;

@@ -160,8 +160,9 @@ const RANGES: [(&str, [f64; 2], [f64; 2]); 3] = [
     ("robot.damping_eta", [0.006, 0.05], [0.003, 0.1]),
 ];
 
-/// A data set of a robot with known constants, which other time steps and perturbed angles measure to 5 %, and the constants; only `every` so-manyth of the numbers is fitted.
-fn known_truth(folder: &Path, seed: u64, every: usize) -> (String, Vec<(&'static str, f64)>) {
+/// A data set of a robot with known constants, which other time steps and perturbed angles measure to 5 %, and the constants to be found; the share of the film is
+/// one of them, or given.
+fn known_truth(folder: &Path, seed: u64, film_is_known: bool) -> (String, Vec<(&'static str, f64)>) {
     let mut random = Random(seed);
     let mut truth: Vec<(&str, f64)> = RANGES.iter().map(|(key, [low, high], _)| (*key, random.ratio(*low, *high))).collect();
     truth.push(("robot.friction.film_fraction", [0.1, 0.4, 0.7][(3.0 * random.unit()) as usize]));
@@ -185,12 +186,17 @@ fn known_truth(folder: &Path, seed: u64, every: usize) -> (String, Vec<(&'static
         let run: Value = serde_json::from_slice(&output.stdout).unwrap();
         run["measures"][measure].as_f64().unwrap_or_else(|| panic!("{}", String::from_utf8_lossy(&output.stderr)))
     };
-    let mut text =
-        "[robot]\nactuators = 5\nmotors_per_actuator = 3\nmount = \"ground\"\n[identify]\nseed = 1\n[identify.vary]\n".to_owned();
+    let mut text = "[robot]\nactuators = 5\nmotors_per_actuator = 3\nmount = \"ground\"\n".to_owned();
+    if film_is_known {
+        text += &format!("[robot.friction]\nfilm_fraction = {:?}\n", truth[RANGES.len()].1);
+    }
+    text += "[identify]\nseed = 1\n[identify.vary]\n";
     for (key, _, [from, to]) in RANGES {
         text += &format!("\"{key}\" = {{ from = {from:?}, to = {to:?} }}\n");
     }
-    text += "\"robot.friction.film_fraction\" = { values = [0.1, 0.4, 0.7] }\n";
+    if !film_is_known {
+        text += "\"robot.friction.film_fraction\" = { values = [0.1, 0.4, 0.7] }\n";
+    }
     let mut observe = |preset: &str, hz: u32, measure: &str, duration: f64, role: &str| {
         let value = measured(preset, hz, measure, duration);
         let sigma = (0.05 * value.abs()).max(0.02);
@@ -200,14 +206,17 @@ fn known_truth(folder: &Path, seed: u64, every: usize) -> (String, Vec<(&'static
             value + sigma * random.normal()
         );
     };
-    FITTED_HZ.iter().step_by(every).for_each(|hz| observe("full-frictional-inchworm", *hz, "speed_mm_s", 3.0, "fit"));
-    JUMPS_HZ.iter().step_by(every).for_each(|hz| observe("crawl", *hz, "jump_height_mm", 1.2, "fit"));
+    FITTED_HZ.iter().for_each(|hz| observe("full-frictional-inchworm", *hz, "speed_mm_s", 3.0, "fit"));
+    JUMPS_HZ.iter().for_each(|hz| observe("crawl", *hz, "jump_height_mm", 1.2, "fit"));
     FORETOLD_HZ.iter().for_each(|hz| observe("full-frictional-inchworm", *hz, "speed_mm_s", 3.0, "foretell"));
+    if film_is_known {
+        truth.pop();
+    }
     (text, truth)
 }
 
-/// Friction, damping and film drawn at random, 12 speeds and 3 jump heights to 5 %. One truth with half of these numbers; with SFERS_LONG=1 twenty, of which 90 to 99 % of the values must lie in their
-/// ranges and the signs of 90 % of the speeds that were left out be right.
+/// Friction, damping and film drawn at random, 12 speeds and 3 jump heights to 5 %. One truth whose film is given; with SFERS_LONG=1 twenty, of which 90 to 99 % of
+/// the values must lie in their ranges and the signs of 90 % of the speeds that were left out be right.
 #[test]
 #[ignore = "slow: run by scripts/test.sh"]
 fn known_truths_lie_in_their_ranges_and_left_out_speeds_have_their_signs() {
@@ -216,7 +225,7 @@ fn known_truths_lie_in_their_ranges_and_left_out_speeds_have_their_signs() {
     let [mut inside, mut values, mut signs, mut speeds] = [0; 4];
     for seed in seeds {
         let folder = tempfile::tempdir().unwrap();
-        let (text, truth) = known_truth(folder.path(), seed, if many { 1 } else { 2 });
+        let (text, truth) = known_truth(folder.path(), seed, !many);
         let found = identified(folder.path(), &text);
         for (key, truth) in truth {
             let listed = found["listed"].as_array().unwrap().iter().find(|constant| constant["key"] == key);
@@ -240,7 +249,7 @@ fn known_truths_lie_in_their_ranges_and_left_out_speeds_have_their_signs() {
             "{inside}/{values}, {signs}/{speeds}"
         );
     } else {
-        // Of one truth one miss in four is no surprise at 95 %.
-        assert!(inside >= 3 && signs >= 2, "{inside} of {values}, {signs} of {speeds}");
+        // Of one truth one miss in three is no surprise at 95 %.
+        assert!(inside >= 2 && signs >= 2, "{inside} of {values}, {signs} of {speeds}");
     }
 }

@@ -10,11 +10,13 @@ use sfers::experiment::{self, Source};
 const README: &str = include_str!("../README.md");
 
 /// Commands that need more than an empty folder, and what runs them instead.
-const ELSEWHERE: [(&str, &str); 4] = [
+const ELSEWHERE: [(&str, &str); 6] = [
     ("bash scripts/demo.sh", "needs the checkout: by hand, and its commands are among those of this test"),
     ("bash scripts/test.sh", "runs this test"),
     ("sfers crosscheck jump.toml --pybullet .venv/bin/python", "needs PyBullet: tests/live_pybullet.rs"),
     ("sfers crosscheck jump.toml --sfers DIR --pybullet .venv/bin/python", "needs the authors' package: by hand"),
+    ("sfers sweep scan.toml --out scan --submit slurm --yes", "needs a cluster: tests/cluster.rs"),
+    ("sfers diagnose --all benches --out found --submit slurm", "needs data: tests/cluster.rs"),
 ];
 
 /// The blocks of a language.

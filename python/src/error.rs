@@ -92,7 +92,10 @@ pub fn of_recording(error: &RecordingError) -> PyErr {
 
 /// `DataError` of a sweep's folder.
 pub fn of_rows(error: &RowError) -> PyErr {
-    exception("DataError", &error.to_string(), &[])
+    match error {
+        RowError::Invalid(error) => of_config(error),
+        error => exception("DataError", &error.to_string(), &[]),
+    }
 }
 
 /// `DiagnosisError`.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use pyo3::prelude::*;
-use sfers::sweep::{self, Outcome, Sweep};
+use sfers::sweep::{self, Outcome, Shard, Sweep};
 
 use crate::error;
 use crate::experiment::toml_of;
@@ -43,7 +43,7 @@ pub fn run_sweep(
     })?;
     told.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)?;
     let Outcome { before, computed, failed, .. } = result.map_err(|e| error::of_rows(&e))?;
-    let results = sweep::merge(&folder, &sweep).map_err(|e| error::of_rows(&e))?;
+    let results = sweep::merge(&folder, &sweep, |_| {}).map_err(|e| error::of_rows(&e))?;
     Ok((results, before, computed, failed))
 }
 
@@ -54,5 +54,5 @@ fn run(
     stop: &std::sync::atomic::AtomicBool,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Outcome, sweep::RowError> {
-    sweep::run(sweep, folder, (1, 1), jobs, stop, progress, |_| {})
+    sweep::run(sweep, folder, Shard::ALL, jobs, stop, progress, |_| {})
 }

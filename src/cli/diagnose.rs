@@ -1,5 +1,7 @@
 //! `sfers diagnose`: causes of model error from measured data.
 
+mod all;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -21,11 +23,17 @@ use crate::files::{FolderLock, Locking};
 /// Writes DIR/diagnosis.json, report.html, extended.toml (with drive.csv) and residuals.csv, and prints the verdict. Of a data set with [identify], which
 /// fits constants to single numbers: identification.json, report.html and identified.toml.
 ///
+/// With --all, of every data set in a folder, here or on a cluster: the results of each in a folder of its own in DIR, and a table, DIR/diagnoses.csv.
+///
 /// Example: sfers diagnose bench-7/dataset.toml --out diagnosis
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The description of the data, the folder of its dataset.toml, or preset:NAME.
-    dataset: PathBuf,
+    #[arg(required_unless_present = "all")]
+    dataset: Option<PathBuf>,
+    /// Diagnose every data set in this folder: its folders with a dataset.toml. What is done already is not done again.
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["dataset", "require"])]
+    all: Option<PathBuf>,
     /// Folder of the results.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -35,6 +43,17 @@ pub struct Args {
     /// End with code 1 unless causes are identified.
     #[arg(long)]
     require: bool,
+    #[command(flatten)]
+    cluster: super::submit::Args,
+}
+
+/// One data set with the folder of its results.
+struct Task<'a> {
+    dataset: &'a Path,
+    out: &'a Path,
+    /// Whether other causes than identified ones are a failure.
+    require: bool,
+    threads: usize,
 }
 
 impl From<DataError> for Failure {
@@ -97,51 +116,63 @@ fn write(folder: &Path, name: &str, text: &str) -> Result<(), Failure> {
 }
 
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
-    let dataset = Dataset::read(&args.dataset)?;
-    std::fs::create_dir_all(&args.out).map_err(|error| unwritable(&args.out, &error))?;
-    drop(pending(&args.out.join("diagnosis.json"))?);
-    lock(&args.out)?;
     let _ = ctrlc::set_handler(interrupt);
-    let result = diagnose(args, options, &dataset);
-    work().lock = None;
+    let threads = args.cluster.jobs(args.jobs);
+    if let Some(folder) = &args.all {
+        return all::run(folder, args, threads, options);
+    }
+    let Some(dataset) = &args.dataset else { return Err(Failure::Usage("a data set or --all is needed".into())) };
+    if args.cluster.shard.is_some() || args.cluster.shards.is_some() || args.cluster.submit.is_some() {
+        return Err(Failure::Usage("--shard and --submit go with --all: one data set is one piece of work".into()));
+    }
+    one(&Task { dataset, out: &args.out, require: args.require, threads }, options)
+}
+
+/// Diagnoses one data set.
+fn one(task: &Task, options: Options) -> Result<ExitCode, Failure> {
+    let dataset = Dataset::read(task.dataset)?;
+    std::fs::create_dir_all(task.out).map_err(|error| unwritable(task.out, &error))?;
+    drop(pending(&task.out.join("diagnosis.json"))?);
+    lock(task.out)?;
+    let result = diagnose(task, options, &dataset);
+    *work() = Work { lock: None, writing: false };
     result
 }
 
 /// Writes what was identified.
-fn identified(args: &Args, options: Options, found: &Identification, page: &str, start: Instant) -> Result<ExitCode, Failure> {
-    let json = serde_json::to_string_pretty(found).map_err(|error| unwritable(&args.out, &error))?;
+fn identified(task: &Task, options: Options, found: &Identification, page: &str, start: Instant) -> Result<ExitCode, Failure> {
+    let json = serde_json::to_string_pretty(found).map_err(|error| unwritable(task.out, &error))?;
     let remarks: String = found.remarks.iter().map(|remark| format!("{remark}\n")).collect();
     let printed = print(&if options.json { format!("{json}\n") } else { format!("{}\n{remarks}", found.summary) });
     work().writing = true;
-    write(&args.out, "identified.toml", &found.file)?;
-    write(&args.out, "report.html", page)?;
-    write(&args.out, "identification.json", &format!("{json}\n"))?;
-    options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
+    write(task.out, "identified.toml", &found.file)?;
+    write(task.out, "report.html", page)?;
+    write(task.out, "identification.json", &format!("{json}\n"))?;
+    options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), task.out.join("report.html").display()));
     printed?;
-    Ok(if args.require && !found.meets_all { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    Ok(if task.require && !found.meets_all { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
-fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode, Failure> {
-    let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), usize::from);
+fn diagnose(task: &Task, options: Options, dataset: &Dataset) -> Result<ExitCode, Failure> {
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs)
+        .num_threads(task.threads)
         .build()
-        .map_err(|error| Failure::Usage(format!("--jobs {jobs}: {error}")))?;
+        .map_err(|error| Failure::Usage(format!("--jobs {}: {error}", task.threads)))?;
     let bar = if options.quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
     if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
         bar.set_style(style);
     }
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     let start = Instant::now();
-    let progress = |task: &str| bar.set_message(task.to_owned());
-    let command = format!("sfers diagnose {} --out {}", args.dataset.display(), args.out.display());
+    let progress = |stage: &str| bar.set_message(stage.to_owned());
+    let command = format!("sfers diagnose {} --out {}", task.dataset.display(), task.out.display());
     let answer = pool.install(|| answer::answer(dataset, &command, &progress));
     bar.finish_and_clear();
     let (diagnosis, files, page) = match answer? {
         Answer::Diagnosed { diagnosis, files, page } => (diagnosis, files, page),
-        Answer::Identified { identification, page } => return identified(args, options, &identification, &page, start),
+        Answer::Identified { identification, page } => return identified(task, options, &identification, &page, start),
     };
-    let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(&args.out, &error))?;
+    let json = serde_json::to_string_pretty(&diagnosis).map_err(|error| unwritable(task.out, &error))?;
     let printed = if options.json {
         print(&format!("{json}\n"))
     } else {
@@ -156,14 +187,14 @@ fn diagnose(args: &Args, options: Options, dataset: &Dataset) -> Result<ExitCode
     };
     work().writing = true;
     if let Some(files) = files {
-        write(&args.out, "extended.toml", &files.experiment)?;
-        write(&args.out, "drive.csv", &files.drive)?;
-        write(&args.out, "residuals.csv", &files.residuals)?;
+        write(task.out, "extended.toml", &files.experiment)?;
+        write(task.out, "drive.csv", &files.drive)?;
+        write(task.out, "residuals.csv", &files.residuals)?;
     }
-    write(&args.out, "report.html", &page)?;
-    write(&args.out, "diagnosis.json", &format!("{json}\n"))?;
-    options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), args.out.join("report.html").display()));
+    write(task.out, "report.html", &page)?;
+    write(task.out, "diagnosis.json", &format!("{json}\n"))?;
+    options.remark(&format!("{:.0} s; the report is {}", start.elapsed().as_secs_f64(), task.out.join("report.html").display()));
     printed?;
     let identified = matches!(diagnosis.verdict, Verdict::Named | Verdict::Tied);
-    Ok(if args.require && !identified { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    Ok(if task.require && !identified { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }

@@ -13,6 +13,7 @@ mod presets;
 #[cfg(feature = "bullet")]
 mod reproduce;
 mod run;
+mod submit;
 mod sweep;
 
 use std::io::{self, Write};

@@ -11,8 +11,9 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::output::{Output, finish, manifest, now, pending, unwritable};
+use super::output::{Output, finish, manifest, pending, unwritable};
 use super::{Failure, INTERRUPTED, Options, print, say};
+use crate::date::now;
 use crate::engine::Engine;
 use crate::experiment::{self, Control, Experiment, Run, SavedState, Setting, Source};
 use crate::export;

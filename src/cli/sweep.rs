@@ -1,6 +1,9 @@
 //! `sfers sweep`: many runs over a grid of values.
 
-use std::path::PathBuf;
+mod status;
+mod submit;
+
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -9,43 +12,44 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::{Failure, INTERRUPTED, Options, print, say};
-use crate::sweep::{self, Outcome, RowError, Sweep};
+use crate::sweep::{self, Outcome, RowError, Shard, Sweep};
 
 /// Run an experiment over a grid of values; results in DIR/results.csv.
 ///
-/// The same command resumes a sweep that was killed.
+/// The same command resumes a sweep that was killed. --submit hands it to a cluster, --status DIR says how far it is.
 ///
 /// Example: sfers preset jump-on-time-scan > scan.toml && sfers sweep scan.toml --out scan
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The sweep file, preset:NAME, or NAME where there is no such file.
-    sweep: PathBuf,
+    #[arg(required_unless_present_any = ["status", "cancel"])]
+    sweep: Option<PathBuf>,
     /// Folder of the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Number of runs at a time; by default one per processor.
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["status", "cancel"])]
+    out: Option<PathBuf>,
+    /// Number of runs at a time; by default one per processor, in jobs of a cluster one.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Compute only every N-th point, beginning with the K-th, and leave the others to other machines.
-    #[arg(long, value_name = "K/N", value_parser = shard)]
-    shard: Option<(usize, usize)>,
     /// Compute nothing: collect the rows-*.csv of all shards in DIR into DIR/results.csv, if no point is missing.
-    #[arg(long, conflicts_with_all = ["shard", "jobs"])]
+    #[arg(long, conflicts_with_all = ["shard", "jobs", "submit"])]
     merge: bool,
+    /// Take the rows of another folder of the same sweep, of another cluster for example, into DIR before merging. May be repeated.
+    #[arg(long, value_name = "DIR", requires = "merge")]
+    from: Vec<PathBuf>,
     /// Override a key of the experiment, or the value of a key in [vary] that has only one. May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Keep the rows in DIR that another revision of the program, or one with another Bullet, computed, and continue with this one.
     #[arg(long)]
     keep_rows: bool,
-}
-
-fn shard(text: &str) -> Result<(usize, usize), String> {
-    let parse = |text: &str| text.parse::<usize>().ok();
-    match text.split_once('/').and_then(|(k, n)| Some((parse(k)?, parse(n)?))) {
-        Some((k, n)) if (1..=n).contains(&k) => Ok((k, n)),
-        _ => Err("a shard is written K/N with K from 1 to N, for example 1/4".into()),
-    }
+    #[command(flatten)]
+    cluster: super::submit::Args,
+    /// Say how far the sweep in DIR is, and compute nothing.
+    #[arg(long, value_name = "DIR", exclusive = true, help_heading = "On a cluster")]
+    status: Option<PathBuf>,
+    /// Cancel the jobs that were submitted for DIR; finished points stay.
+    #[arg(long, value_name = "DIR", exclusive = true, help_heading = "On a cluster")]
+    cancel: Option<PathBuf>,
 }
 
 static INTERRUPT: AtomicBool = AtomicBool::new(false);
@@ -53,31 +57,41 @@ static INTERRUPT: AtomicBool = AtomicBool::new(false);
 impl From<RowError> for Failure {
     fn from(error: RowError) -> Self {
         match error {
-            RowError::Foreign { .. } | RowError::OtherProgram { .. } | RowError::Io { .. } => Self::Usage(error.to_string()),
-            RowError::Incomplete { .. } => Self::Data(error.to_string()),
+            RowError::Foreign { .. } | RowError::Io { .. } => Self::Usage(error.to_string()),
+            RowError::OtherProgram { .. } => Self::Usage(format!("{error}, or keep its rows with --keep-rows")),
+            RowError::Invalid(error) => error.into(),
+            RowError::Incomplete { .. } | RowError::Contradiction { .. } => Self::Data(error.to_string()),
         }
     }
 }
 
 pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
-    let sweep = Sweep::open(&args.sweep, &args.settings)?;
+    if let Some(folder) = &args.status {
+        return status::status(folder, options);
+    }
+    if let Some(folder) = &args.cancel {
+        return status::cancel(folder, options);
+    }
+    let (Some(file), Some(out)) = (&args.sweep, &args.out) else {
+        return Err(Failure::Usage("a sweep file and --out are needed".into()));
+    };
+    if let Some(scheduler) = args.cluster.submit {
+        return submit::submit(file, out, args, scheduler, options);
+    }
+    let shard = args.cluster.shard()?;
+    let sweep = Sweep::open(file, &args.settings)?;
     let start = Instant::now();
     if args.keep_rows {
-        sweep::adopt(&args.out, &sweep)?;
+        sweep::adopt(out, &sweep)?;
     }
-    let advise = |error| match error {
-        RowError::OtherProgram { .. } => Failure::Usage(format!("{error}, or keep its rows with --keep-rows")),
-        other => other.into(),
-    };
-    let outcome = if args.merge { None } else { Some(compute(args, &sweep, options).map_err(advise)?) };
+    let outcome = if args.merge { None } else { Some(compute(args, &sweep, out, shard, options)?) };
+    if !args.from.is_empty() {
+        let gathered = sweep::gather(out, &sweep, &args.from)?;
+        options.remark(&format!("{gathered} points taken from other folders"));
+    }
     let wall_s = start.elapsed().as_secs_f64();
     let interrupted = outcome.is_some_and(|outcome| outcome.interrupted);
-    // The last shard to end finds all rows; the others leave the results to the merge.
-    let results = match sweep::merge(&args.out, &sweep) {
-        Ok(path) => Some(path),
-        Err(RowError::Incomplete { .. }) if !args.merge => None,
-        Err(error) => return Err(advise(error)),
-    };
+    let results = results(args, &sweep, out, shard, outcome)?;
     let Outcome { before, computed, failed, .. } = outcome.unwrap_or_default();
     if let Some(outcome) = outcome {
         options.remark(&format!(
@@ -102,13 +116,29 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     Ok(if interrupted { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
 }
 
-fn compute(args: &Args, sweep: &Sweep, options: Options) -> Result<Outcome, RowError> {
+/// Writes the results if no point is missing; whoever ends last finds all rows.
+fn results(args: &Args, sweep: &Sweep, out: &Path, shard: Shard, outcome: Option<Outcome>) -> Result<Option<PathBuf>, Failure> {
+    if outcome.is_some_and(|outcome| outcome.interrupted) || !args.merge && !sweep::all_have_begun(out, shard)? {
+        return Ok(None);
+    }
+    match sweep::merge(out, sweep, warn) {
+        Ok(path) => Ok(Some(path)),
+        Err(RowError::Incomplete { .. }) if !args.merge => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn warn(warning: &str) {
+    say(&format!("warning: {warning}"));
+}
+
+fn compute(args: &Args, sweep: &Sweep, out: &Path, shard: Shard, options: Options) -> Result<Outcome, RowError> {
     let _ = ctrlc::set_handler(|| INTERRUPT.store(true, Ordering::Relaxed));
     let bar = if options.quiet { ProgressBar::hidden() } else { ProgressBar::new(0) };
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} points  {per_sec}  {eta} left") {
         bar.set_style(style);
     }
-    let jobs = args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, Into::into), usize::from);
+    let jobs = args.cluster.jobs(args.jobs);
     let first = AtomicBool::new(true);
     let progress = |done: usize, points: usize| {
         bar.set_length(points as u64);
@@ -118,8 +148,7 @@ fn compute(args: &Args, sweep: &Sweep, options: Options) -> Result<Outcome, RowE
             bar.reset_eta();
         }
     };
-    let warn = |warning: &str| say(&format!("warning: {warning}"));
-    let outcome = sweep::run(sweep, &args.out, args.shard.unwrap_or((1, 1)), jobs, &INTERRUPT, progress, warn);
+    let outcome = sweep::run(sweep, out, shard, jobs, &INTERRUPT, progress, warn);
     bar.finish_and_clear();
     outcome
 }

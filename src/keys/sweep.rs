@@ -31,7 +31,7 @@ pub(super) const TOP: Section = Section {
 const VARY: Section = Section {
     name: "vary",
     heading: "[vary]",
-    about: "The grid, the last key fastest; at most 500000 points. Its keys are those of the experiment file with dots, in quotes: \
+    about: "The grid, the last key fastest; at most 10000000 points. Its keys are those of the experiment file with dots, in quotes: \
             \"robot.damping_eta\" = [0.008, 0.045]. Each has a list of values, or a range:",
     keys: &[],
 };

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::{Effort, StudyError};
 use crate::experiment::{self, Control, Experiment, Run, Source, presets};
-use crate::sweep::{self, Row as Point, Rows, Sweep};
+use crate::sweep::{self, Row as Point, Shard, Sweep};
 
 /// Settings and cached runs of studies.
 pub struct Bench<'a> {
@@ -95,12 +95,12 @@ impl<'a> Bench<'a> {
 
     fn compute(&self, id: &str, sweep: Sweep) -> Result<(Sweep, Vec<Point>), StudyError> {
         let folder = self.folder.join(id);
-        let outcome = sweep::run(&sweep, &folder, (1, 1), self.jobs, self.stop, |_, _| {}, |_| {})?;
+        let outcome = sweep::run(&sweep, &folder, Shard::ALL, self.jobs, self.stop, |_, _| {}, |_| {})?;
         if outcome.interrupted {
             return Err(StudyError::Interrupted);
         }
-        sweep::merge(&folder, &sweep)?;
-        let points = Rows::open(&folder, &sweep, 1, 1)?.done().values().cloned().collect();
+        sweep::merge(&folder, &sweep, |_| {})?;
+        let points = sweep::rows(&folder, &sweep)?;
         Ok((sweep, points))
     }
 }

@@ -8,7 +8,7 @@ use super::{RowError, Sweep};
 use crate::files::Pending;
 
 /// This program: results may change with its revision and with Bullet's version.
-const PROGRAM: &str =
+pub const PROGRAM: &str =
     concat!("sfers ", env!("CARGO_PKG_VERSION"), ", revision ", env!("SFERS_GIT_REVISION"), ", Bullet ", env!("SFERS_BULLET"));
 
 /// Key of the list of programs, the only part of an identity that may grow.
@@ -20,7 +20,7 @@ impl Sweep {
         let axes: Vec<_> = self.axes.iter().map(|axis| json!({"key": axis.key, "values": axis.values})).collect();
         let settings: Vec<_> = self.source.settings().iter().map(|setting| json!([setting.key, setting.value])).collect();
         json!({
-            "schema": 3,
+            "schema": 4,
             PROGRAMS: [PROGRAM],
             "experiment": self.source.text(),
             "settings": settings,
@@ -41,7 +41,24 @@ impl Sweep {
             // Shards that start together write the same text.
             return write(&path, &self.identity());
         };
-        self.compare(&path, &found)?;
+        self.accept(path, &found)
+    }
+
+    /// Checks that a folder holds rows of this sweep, by this program.
+    ///
+    /// # Errors
+    /// As [`claim`](Self::claim), and [`RowError::Foreign`] if the folder is none of a sweep.
+    pub(super) fn check_identity(&self, folder: &Path) -> Result<(), RowError> {
+        let path = path(folder);
+        let Some(found) = read(&path)? else {
+            return Err(RowError::Foreign { path, reason: "is not there: this is no folder of a sweep".into() });
+        };
+        self.accept(path, &found)
+    }
+
+    /// Accepts an identity of this sweep and this program.
+    fn accept(&self, path: PathBuf, found: &Value) -> Result<(), RowError> {
+        self.compare(&path, found)?;
         let programs = found[PROGRAMS].as_array().cloned().unwrap_or_default();
         if programs.iter().any(|program| program == PROGRAM) {
             return Ok(());
@@ -64,6 +81,15 @@ impl Sweep {
     }
 }
 
+/// Creates a folder for the rows of a sweep, or checks that it belongs to it.
+///
+/// # Errors
+/// [`RowError`] if it cannot be written, or belongs to another sweep or another program.
+pub fn claim(folder: &Path, sweep: &Sweep) -> Result<(), RowError> {
+    std::fs::create_dir_all(folder).map_err(super::rows::io(folder))?;
+    sweep.claim(folder)
+}
+
 /// Adds this program to the identity in the folder, so that a sweep of another revision can continue.
 ///
 /// # Errors
@@ -79,11 +105,11 @@ pub fn adopt(folder: &Path, sweep: &Sweep) -> Result<(), RowError> {
     write(&path, &found)
 }
 
-fn path(folder: &Path) -> PathBuf {
+pub(super) fn path(folder: &Path) -> PathBuf {
     folder.join("sweep.json")
 }
 
-fn read(path: &Path) -> Result<Option<Value>, RowError> {
+pub(super) fn read(path: &Path) -> Result<Option<Value>, RowError> {
     match crate::files::read_text(path) {
         Ok(text) => serde_json::from_str(&text).map(Some).map_err(|error| RowError::Foreign {
             path: path.into(),

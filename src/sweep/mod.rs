@@ -12,17 +12,27 @@
 //!
 //! Runs are on the planar engine unless the experiment names an engine.
 
+mod finished;
 mod identity;
+mod journal;
+mod merge;
 mod rows;
 mod run;
+mod shard;
+pub mod status;
+pub mod submit;
 
-pub use identity::adopt;
-pub use rows::{Row, RowError, Rows, merge};
-pub use run::{Outcome, run};
+pub use finished::Finished;
+pub use identity::{PROGRAM, adopt, claim};
+pub use merge::{gather, merge, missing, rows};
+pub use rows::{Point, Row, RowError, Rows};
+pub use run::{Outcome, all_have_begun, mean_time, run};
+pub use shard::Shard;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -31,8 +41,8 @@ use crate::files;
 use crate::recording::definitions;
 use crate::words;
 
-/// Largest number of points of a grid: all are checked before the first run, in about 25 µs each.
-const MAX_POINTS: usize = 500_000;
+/// Largest number of points of a grid. Those that a process computes are checked before its first run, in about 25 µs each.
+const MAX_POINTS: usize = 10_000_000;
 
 /// A varied key with its values.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +63,7 @@ impl Axis {
     }
 }
 
-/// A checked sweep.
+/// A sweep.
 #[derive(Debug, Clone)]
 pub struct Sweep {
     /// The experiment that is varied.
@@ -88,10 +98,11 @@ pub(crate) struct Range {
 }
 
 impl Sweep {
-    /// Parses a sweep and checks every point. `name` is for messages; the experiment's path is relative to `folder`.
+    /// Parses a sweep and checks its first point; [`check`](Self::check) does the others. `name` is for messages; the experiment's path is relative to
+    /// `folder`.
     ///
     /// # Errors
-    /// [`ConfigError`] for unknown keys or measures, an empty range, or a point that is not a valid experiment.
+    /// [`ConfigError`] for unknown keys or measures, an empty range, or a first point that is not a valid experiment.
     pub fn from_text(name: &str, text: &str, folder: &Path) -> Result<Self, ConfigError> {
         Self::with_settings(name, text, folder, &[])
     }
@@ -128,7 +139,7 @@ impl Sweep {
         }
         let is_ensemble = source.parse()?.ensemble.is_some();
         let mut sweep = Self { source, measures: file.measures, axes, is_ensemble, files: BTreeMap::new() };
-        for index in 0..sweep.len() {
+        for index in sweep.combinations_of_words() {
             for file in experiment::experiment(&sweep.source_of(index)?)?.config.files() {
                 let name = file.display().to_string();
                 if !sweep.files.contains_key(&name) {
@@ -138,6 +149,31 @@ impl Sweep {
         }
         sweep.members(0)?;
         Ok(sweep)
+    }
+
+    /// Points with all combinations of the values that are not numbers, which alone can name files, each with the first of the numbers.
+    fn combinations_of_words(&self) -> Vec<usize> {
+        let mut points = vec![0];
+        let mut stride = self.len();
+        for axis in &self.axes {
+            stride /= axis.values.len();
+            if !axis.values.iter().all(is_numeric) {
+                points =
+                    points.iter().flat_map(|point| (0..axis.values.len()).map(move |value| point + value * stride)).collect();
+            }
+        }
+        points
+    }
+
+    /// Checks points, on all threads of the current pool.
+    ///
+    /// # Errors
+    /// [`ConfigError`] of the first one that is not a valid experiment.
+    pub fn check(&self, points: &[usize]) -> Result<(), ConfigError> {
+        match points.par_iter().find_map_first(|&index| self.experiment(index).err()) {
+            Some(error) => Err(error),
+            None => Ok(()),
+        }
     }
 
     fn digest(&self, file: &Path) -> Result<String, ConfigError> {
@@ -199,19 +235,16 @@ impl Sweep {
 
     /// The values of a point, one per axis.
     pub fn point(&self, index: usize) -> Vec<&Value> {
-        let mut rest = index;
-        let mut values: Vec<&Value> = self
-            .axes
-            .iter()
-            .rev()
-            .map(|axis| {
-                let value = &axis.values[rest % axis.values.len()];
-                rest /= axis.values.len();
-                value
-            })
-            .collect();
-        values.reverse();
-        values
+        self.axes.iter().zip(self.places(index)).map(|(axis, place)| &axis.values[place]).collect()
+    }
+
+    /// The places of a point's values in the lists of the axes.
+    fn places(&self, index: usize) -> impl Iterator<Item = usize> {
+        let mut stride = self.len();
+        self.axes.iter().map(move |axis| {
+            stride /= axis.values.len();
+            index / stride % axis.values.len()
+        })
     }
 
     /// The experiment of a point.
@@ -253,6 +286,15 @@ impl Sweep {
     pub fn header(&self) -> Vec<String> {
         let keys = self.axes.iter().map(|axis| axis.key.clone());
         keys.chain(self.columns()).chain(["status".to_owned()]).collect()
+    }
+}
+
+/// True for numbers and lists of them.
+fn is_numeric(value: &Value) -> bool {
+    match value {
+        Value::Integer(_) | Value::Float(_) => true,
+        Value::Array(list) => list.iter().all(is_numeric),
+        _ => false,
     }
 }
 
@@ -363,7 +405,8 @@ mod tests {
     const TEXT: &str = "experiment = \"preset:jump-on-time\"\nmeasures = [\"jump_height_mm\"]\n[vary]\n";
 
     fn sweep(vary: &str) -> Result<Sweep, ConfigError> {
-        Sweep::from_text("s.toml", &format!("{TEXT}{vary}"), Path::new(""))
+        let sweep = Sweep::from_text("s.toml", &format!("{TEXT}{vary}"), Path::new(""))?;
+        sweep.check(&(0..sweep.len()).collect::<Vec<_>>()).map(|()| sweep)
     }
 
     #[test]

@@ -24,6 +24,17 @@ pub fn chromium(test: &str) -> Option<Command> {
     None
 }
 
+/// True if a command of Debian's `packages` is there.
+#[allow(dead_code)]
+pub fn has_command(test: &str, command: &str, packages: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let there = std::env::split_paths(&path).any(|folder| folder.join(command).is_file());
+    if !there {
+        skip(test, command, &format!("scripts/debian.sh {packages}"));
+    }
+    there
+}
+
 fn runs(command: &mut Command) -> bool {
     let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
     status.is_ok_and(|status| status.success())

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use sfers::experiment::presets::SWEEPS;
 use sfers::recording::measures::Measures;
-use sfers::sweep::{self, Sweep};
+use sfers::sweep::{self, Shard, Sweep};
 use sfers::view;
 
 use crate::experiments;
@@ -64,8 +64,8 @@ pub fn give_sweep(input: &Input, folder: &Path, _: &mut Random) -> Outcome {
     }
     let out = folder.join("out");
     let outcome =
-        sweep::run(&sweep, &out, (1, 1), 1, &AtomicBool::new(false), |_, _| {}, |_| {}).map_err(|error| error.to_string())?;
-    let path = sweep::merge(&out, &sweep).map_err(|error| error.to_string())?;
+        sweep::run(&sweep, &out, Shard::ALL, 1, &AtomicBool::new(false), |_, _| {}, |_| {}).map_err(|error| error.to_string())?;
+    let path = sweep::merge(&out, &sweep, |_| {}).map_err(|error| error.to_string())?;
     let text = std::fs::read_to_string(&path).map_err(|error| error.to_string())?;
     for record in csv::Reader::from_reader(text.as_bytes()).records() {
         let record = record.map_err(|error| format!("results.csv: {error}"))?;
