@@ -3,7 +3,7 @@
 
     python3 scripts/bench_sweeps.py [POINTS] [SHARDS]
 
-1. POINTS (default 100,000) planar points of 1,000 steps in one process, and in SHARDS (default 64) processes, two at a time: core seconds of both in turns (three
+1. POINTS (default 100,000) planar points of 2,000 steps in one process, and in SHARDS (default 64) processes, two at a time: core seconds of both in turns (three
    pairs, ratio of the medians), numbers of files, equal bytes. The points' own time is that of one process: it holds reading and checking once.
 2. A finished sweep of 1,000,000 rows, resumed: wall time and largest memory, three times.
 """
@@ -24,7 +24,7 @@ actuators = 1
 mount = "clamped"
 [drive]
 waveform = "dc"
-voltages_v = [0]
+voltages_v = [-500]
 [simulation]
 engine = "planar"
 time_step_s = 1e-4
@@ -37,7 +37,7 @@ def write(folder: Path, points: int, steps: int) -> None:
     (folder / "s.toml").write_text(
         'experiment = "a.toml"\nmeasures = ["tip_deflection_mm"]\n[vary]\n'
         f'"robot.damping_eta" = {{ from = 0.01, to = 0.04, count = {points // 100} }}\n'
-        '"robot.initial_height_mm" = { from = 10.0, to = 20.0, count = 100 }\n'
+        '"robot.positive_gain" = { from = 1.0, to = 1.2, count = 100 }\n'
     )
 
 
@@ -57,7 +57,7 @@ def division(points: int, shards: int) -> None:
     for _ in range(3):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            write(folder, points, 1000)
+            write(folder, points, 2000)
             ones.append(core_s(lambda: run(folder, "--out", "one", "--jobs", "2")))
 
             def all_shards() -> None:

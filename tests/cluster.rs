@@ -196,8 +196,12 @@ fn a_scan_on_slurm_survives_a_dead_node_and_a_killed_task() {
     slurm.script("kill-node", &["node2"]);
     // Slurm would notice by itself, some 15 s later.
     slurm.call("scontrol", &["update", "NodeName=node2", "State=DOWN", "Reason=power"]);
-    let running = slurm.running();
-    slurm.call("scancel", &["--signal=KILL", running.first().expect("node1 works on")]);
+    let mut running = Vec::new();
+    until("work on node1", 30, || {
+        running = slurm.running();
+        !running.is_empty()
+    });
+    slurm.call("scancel", &["--signal=KILL", &running[0]]);
     slurm.script("start-node", &["node2"]);
     until("the end of all jobs", 120, || slurm.call("squeue", &["--noheader"]).is_empty());
 
@@ -252,7 +256,7 @@ fn a_cancelled_scan_goes_on_and_diagnoses_run_on_slurm() {
 
     // Three sound sets and a damaged one.
     let data = bench.path("data");
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cardstock_strip");
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/released");
     for name in ["a", "b", "c", "damaged"] {
         fs::create_dir_all(data.join(name)).unwrap();
         for entry in fs::read_dir(&example).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {

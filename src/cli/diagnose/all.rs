@@ -22,7 +22,7 @@ const DONE: &str = "done.json";
 struct Done {
     schema: u32,
     program: String,
-    /// Of all files in the data set's folder.
+    /// Of the description and all files that it names.
     digest: String,
     /// `ok`, or why there is no diagnosis.
     status: String,
@@ -103,16 +103,30 @@ fn sets(folder: &Path, out: &Path) -> Result<Vec<Set>, Failure> {
     Ok(sets)
 }
 
-/// A digest of the names and contents of the files in a folder.
+/// A digest of a description and of all files that it names.
 fn digest(folder: &Path) -> std::io::Result<String> {
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
-    paths.retain(|path| path.is_file());
-    paths.sort();
-    let mut all = String::new();
-    for path in paths {
-        all += &format!("{}: {}\n", path.file_name().unwrap_or_default().display(), files::digest(&files::read(&path)?));
+    let text = files::read_text(&folder.join("dataset.toml"))?;
+    let mut all = files::digest(text.as_bytes());
+    // One with a mistake is told where it is read.
+    if let Ok(table) = text.parse::<toml::Table>() {
+        for name in texts(&toml::Value::Table(table)) {
+            let path = folder.join(&name);
+            if path.is_file() {
+                all += &format!("\n{name}: {}", files::digest(&files::read(&path)?));
+            }
+        }
     }
     Ok(files::digest(all.as_bytes()))
+}
+
+/// All texts in a value, in order.
+fn texts(value: &toml::Value) -> Vec<String> {
+    match value {
+        toml::Value::String(text) => vec![text.clone()],
+        toml::Value::Array(list) => list.iter().flat_map(texts).collect(),
+        toml::Value::Table(table) => table.values().flat_map(texts).collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// Diagnoses the data sets of this shard that are not done, or hands them to a cluster.
