@@ -14,6 +14,9 @@ use serde_json::json;
 use super::{Failure, INTERRUPTED, Options, print, say};
 use crate::sweep::{self, Outcome, RowError, Shard, Sweep};
 
+/// What --status and --cancel do not go with.
+const OTHERS: [&str; 9] = ["sweep", "out", "jobs", "merge", "settings", "keep_rows", "shard", "submit", "shards"];
+
 /// Run an experiment over a grid of values; results in DIR/results.csv.
 ///
 /// The same command resumes a sweep that was killed. --submit hands it to a cluster, --status DIR says how far it is.
@@ -45,10 +48,10 @@ pub struct Args {
     #[command(flatten)]
     cluster: super::submit::Args,
     /// Say how far the sweep in DIR is, and compute nothing.
-    #[arg(long, value_name = "DIR", exclusive = true, help_heading = "On a cluster")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = OTHERS, help_heading = "On a cluster")]
     status: Option<PathBuf>,
     /// Cancel the jobs that were submitted for DIR; finished points stay.
-    #[arg(long, value_name = "DIR", exclusive = true, help_heading = "On a cluster")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = OTHERS, conflicts_with = "status", help_heading = "On a cluster")]
     cancel: Option<PathBuf>,
 }
 

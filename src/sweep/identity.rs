@@ -4,12 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::journal::PROGRAM;
 use super::{RowError, Sweep};
 use crate::files::Pending;
-
-/// This program: results may change with its revision and with Bullet's version.
-pub const PROGRAM: &str =
-    concat!("sfers ", env!("CARGO_PKG_VERSION"), ", revision ", env!("SFERS_GIT_REVISION"), ", Bullet ", env!("SFERS_BULLET"));
 
 /// Key of the list of programs, the only part of an identity that may grow.
 const PROGRAMS: &str = "programs";

@@ -4,9 +4,12 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::identity::PROGRAM;
 use super::shard;
 use crate::date;
+
+/// This program: results may change with its revision and with Bullet's version.
+pub const PROGRAM: &str =
+    concat!("sfers ", env!("CARGO_PKG_VERSION"), ", revision ", env!("SFERS_GIT_REVISION"), ", Bullet ", env!("SFERS_BULLET"));
 
 /// The beginning of a process's work.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]

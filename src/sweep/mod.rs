@@ -23,7 +23,8 @@ pub mod status;
 pub mod submit;
 
 pub use finished::Finished;
-pub use identity::{PROGRAM, adopt, claim};
+pub use identity::{adopt, claim};
+pub use journal::PROGRAM;
 pub use merge::{gather, merge, missing, rows};
 pub use rows::{Point, Row, RowError, Rows};
 pub use run::{Outcome, all_have_begun, mean_time, run};

@@ -59,7 +59,8 @@ on_node() {
 }
 
 # end COMMAND...: SIGKILL to all processes whose ids COMMAND prints. First all are stopped, until no new one appears: otherwise a
-# batch script would notice the end of its child, and go on to its next line before its own turn comes.
+# batch script would notice the end of its child, and go on to its next line before its own turn comes. Then jobs
+# before what started them: a stopped process whose parent ends is sent SIGHUP and goes on.
 end() {
   local found=() before='' until=$((SECONDS + 10))
   while mapfile -t found < <("$@") && [ "${found[*]}" != "$before" ]; do
@@ -67,7 +68,7 @@ end() {
     before=${found[*]}
   done
   while [ ${#found[@]} -gt 0 ]; do
-    kill -KILL "${found[@]}" 2> /dev/null || true
+    kill -KILL $(printf '%s\n' "${found[@]}" | tac) 2> /dev/null || true
     sleep 0.05
     mapfile -t found < <("$@")
     [ $SECONDS -lt $until ] || die "these processes do not end: ${found[*]}"

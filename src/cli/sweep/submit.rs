@@ -18,7 +18,7 @@ pub fn submit(file: &Path, out: &Path, args: &Args, scheduler: Scheduler, option
     let sweep = Sweep::open(file, &args.settings)?;
     let folder = absolute(out)?;
     let earlier = ended(&folder)?;
-    if args.keep_rows {
+    if args.keep_rows && !args.cluster.dry_run {
         sweep::adopt(&folder, &sweep)?;
     }
     let missing = sweep::missing(&folder, &sweep, warn)?;

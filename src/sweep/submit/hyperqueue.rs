@@ -21,7 +21,7 @@ pub(super) fn plan(job: &Job) -> Plan {
     let shards = format!("#!/bin/bash\n{header}# One shard of {}.\n{}", job.shards, job.shard_command("$HQ_TASK_ID"));
     let finish = format!(
         "#!/bin/bash\n# After the shards: computes what they left and collects the results.\n{}",
-        job.finish_command("hq-*.log")
+        job.finish_command("hq-*_*.log")
     );
     let commands = vec![shown("hq", &arguments(job)), format!("hq job wait JOB1; bash {}", quoted(&job.script(FINISH)))];
     Plan { scripts: vec![(SHARDS, shards), (FINISH, finish)], commands }

@@ -2,8 +2,8 @@
 
 use super::{FINISH, Job, Plan, SHARDS, Scheduler, SubmitError, call, directives, quoted, ranges, shown};
 
-/// Names of the logs, of which a shard that ended well leaves none.
-const LOGS: &str = "slurm-*.log";
+/// Names of the shards' logs; of a shard that ended well none is kept.
+const LOGS: &str = "slurm-*_*.log";
 
 /// Largest index of an array where Slurm does not say (its default `MaxArraySize` is 1001, which the index must stay below).
 const LARGEST_INDEX: usize = 1000;
