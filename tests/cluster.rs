@@ -424,6 +424,41 @@ fn hyperqueue_is_called_asked_and_told_to_cancel() {
     assert!(bench.read("called").contains("job cancel 5"));
 }
 
+#[test]
+fn status_tells_running_killed_and_interrupted_shards_apart() {
+    let bench = Bench::new(4000);
+    let begin = |shard: &str| {
+        let before = bench.points("out").len();
+        let mut command = bench.command(&["sweep", "s.toml", "--out", "out", "--jobs", "1", "--quiet", "--shard", shard]);
+        let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        until("some rows", 60, || bench.points("out").len() > before + 3);
+        child
+    };
+    let status = || bench.done(&["sweep", "--status", "out"], &[]);
+    let mut child = begin("1/3");
+    let text = status();
+    assert!(
+        text.contains("3 shards: 2 not begun, 1 running, 0 done, 0 stopped, 0 killed") && text.contains("points/s, "),
+        "{text}"
+    );
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let text = status();
+    assert!(
+        text.contains("2 not begun, 0 running, 0 done, 0 stopped, 1 killed") && text.contains("nothing is at work"),
+        "{text}"
+    );
+    let mut child = begin("2/3");
+    Command::new("bash").args(["-c", &format!("kill -TERM {}", child.id())]).output().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(status().contains("1 not begun, 0 running, 0 done, 1 stopped, 1 killed"), "{}", status());
+    // As a network file system may leave it.
+    let path = bench.path("out/rows-1-of-3.csv");
+    fs::write(&path, bench.read("out/rows-1-of-3.csv") + "\0\0\0\0\n").unwrap();
+    let text = status();
+    assert!(text.contains("rows-1-of-3.csv: 1 line is damaged") && text.contains("counted as missing"), "{text}");
+}
+
 /// As on a node that does not have the program, and in a job whose sweep file was changed after it was submitted.
 #[test]
 fn a_job_says_what_is_wrong_on_its_machine() {
