@@ -3,26 +3,34 @@
 #
 # Recordings are compared as CSV, all digits of them: an NPZ holds the minute of its making.
 #   bash scripts/as_shipped.sh                  the second program is built in target/as-shipped and stays there, for scripts/bench_engines.py too
-#   bash scripts/as_shipped.sh --unoptimised    it is built without optimisation, which changes no bits and saves minutes: for this comparison only
+#   bash scripts/as_shipped.sh --unoptimised    its own crate is built without optimisation, which changes no bits and saves minutes: for this comparison only
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
-cargo build --release --locked --bin sfers
-as_shipped=target/as-shipped
+build() { cargo build --release --locked --bin sfers "$@"; }
+build
+cp target/release/sfers "$folder/own"
 if [ "${1:-}" = --unoptimised ]; then
-  as_shipped=target/as-shipped-unoptimised
-  export CARGO_PROFILE_RELEASE_OPT_LEVEL=0 CARGO_PROFILE_RELEASE_DEBUG=0
+  # In the same folder, where all other crates are built already; afterwards the program is itself again.
+  build --features bullet-as-shipped --config 'profile.release.package.sfers-rs.opt-level=0'
+  cp target/release/sfers "$folder/shipped"
+  build
+else
+  build --features bullet-as-shipped --target-dir target/as-shipped
+  cp target/as-shipped/release/sfers "$folder/shipped"
 fi
-cargo build --release --locked --bin sfers --features bullet-as-shipped --target-dir "$as_shipped"
+if cmp --quiet "$folder/own" "$folder/shipped"; then
+  echo "both programs are the same: nothing to compare"
+  exit 1
+fi
 for preset in cantilever-dc jump-14hz full-frictional-inchworm; do
-  for build in target/release "$as_shipped/release"; do
-    "$build/sfers" preset "$preset" \
-      | "$build/sfers" run - --quiet --set simulation.engine=bullet --set simulation.duration_s=0.1 --out "$folder/out.csv" > /dev/null
-    mv "$folder/out.csv" "$folder/$(echo "$build" | tr / -).csv"
+  for program in own shipped; do
+    "$folder/$program" preset "$preset" \
+      | "$folder/$program" run - --quiet --set simulation.engine=bullet --set simulation.duration_s=0.1 --out "$folder/$program.csv" > /dev/null
   done
-  cmp "$folder/target-release.csv" "$folder/$(echo "$as_shipped" | tr / -)-release.csv"
+  cmp "$folder/own.csv" "$folder/shipped.csv"
   echo "$preset: the same bytes"
 done

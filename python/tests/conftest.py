@@ -1,6 +1,7 @@
 """What the tests share. Their own modules are importable, in other processes too."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,9 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS = ROOT / "tests" / "recordings"
+
+# What the tests start hears Ctrl-C, even where they themselves were started with it ignored, as in the background of a script.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 HERE = str(Path(__file__).parent)
 sys.path.insert(0, HERE)
