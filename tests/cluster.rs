@@ -506,10 +506,15 @@ fn partial_folders_of_two_clusters_become_one_and_a_copy_goes_on() {
     for (folder, shards) in [("here", ["1/4", "2/4"]), ("there", ["1/8", "3/8"])] {
         shards.iter().for_each(|shard| drop(bench.done(&["sweep", "s.toml", "--out", folder, "--shard", shard], &[])));
     }
+    let damaged = bench.read("there/rows-3-of-8.csv") + "\0\0\0\0\n";
+    fs::write(bench.path("there/rows-3-of-8.csv"), damaged).unwrap();
     let output = bench.sfers(&["sweep", "s.toml", "--out", "here", "--merge", "--from", "there"], &[]);
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        output.status.code() == Some(3) && text.contains("10 points taken") && text.contains("30 of 80 points are missing"),
+        output.status.code() == Some(3)
+            && text.contains("10 points taken")
+            && text.contains("30 of 80 points are missing")
+            && text.contains("rows-3-of-8.csv: 1 line is damaged"),
         "{text}"
     );
     fs::create_dir(bench.path("copy")).unwrap();

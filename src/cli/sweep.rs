@@ -89,7 +89,7 @@ pub fn run(args: &Args, options: Options) -> Result<ExitCode, Failure> {
     }
     let outcome = if args.merge { None } else { Some(compute(args, &sweep, out, shard, options)?) };
     if !args.from.is_empty() {
-        let gathered = sweep::gather(out, &sweep, &args.from)?;
+        let gathered = sweep::gather(out, &sweep, &args.from, warn)?;
         options.remark(&format!("{gathered} points taken from other folders"));
     }
     let wall_s = start.elapsed().as_secs_f64();

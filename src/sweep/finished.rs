@@ -40,7 +40,7 @@ struct Place {
 }
 
 /// Whether a file of this name holds rows.
-pub(super) fn is_rows_file(name: &str) -> bool {
+fn is_rows_file(name: &str) -> bool {
     name.starts_with("rows-") && name.ends_with(".csv")
 }
 
@@ -71,7 +71,7 @@ impl Finished {
         Ok(finished)
     }
 
-    pub(super) fn add(&mut self, path: PathBuf, bytes: Vec<u8>) -> Result<(), RowError> {
+    fn add(&mut self, path: PathBuf, bytes: Vec<u8>) -> Result<(), RowError> {
         let file = self.files.len() as u32;
         let (mut notes, mut damaged, mut since_begin) = (Vec::new(), Vec::new(), 0);
         let mut start = 0;

@@ -74,34 +74,32 @@ pub fn missing(folder: &Path, sweep: &Sweep, warn: impl Fn(&str)) -> Result<Vec<
 /// Name of the file that rows of other folders go to.
 const GATHERED: &str = "rows-gathered.csv";
 
-/// Takes the rows of other folders of the same sweep, of another machine for example, into `folder`; returns the number of points that it did not have.
+/// Takes the rows of other folders of the same sweep, of another machine for example, into `folder`; returns the number of points that it did not have. `warn`
+/// gets what is damaged.
 ///
 /// # Errors
-/// [`RowError`] if a folder is another sweep's or of another program, or two results of one point differ.
-pub fn gather(folder: &Path, sweep: &Sweep, others: &[PathBuf]) -> Result<usize, RowError> {
+/// [`RowError`] if a folder is another sweep's or of another program, or two results of one point differ; no row is taken then.
+pub fn gather(folder: &Path, sweep: &Sweep, others: &[PathBuf], warn: impl Fn(&str)) -> Result<usize, RowError> {
     for other in others {
         sweep.check_identity(other)?;
     }
     let mut rows = Rows::open(folder, sweep, GATHERED)?;
-    let mut gathered = 0;
-    let mut finished = Finished::read(sweep.len(), rows_files(folder)?)?;
+    let mut paths = rows_files(folder)?;
+    let own = Finished::read(sweep.len(), paths.clone())?;
     for other in others {
-        let theirs = Finished::read(sweep.len(), rows_files(other)?)?;
-        let new: Vec<usize> = (0..sweep.len()).filter(|&index| !finished.has(index) && theirs.has(index)).collect();
-        if !new.is_empty() {
-            theirs.files().iter().flat_map(|file| &file.notes).try_for_each(|note| rows.note(note))?;
-        }
-        for row in new.iter().filter_map(|&index| theirs.row(index)) {
-            rows.append(&row)?;
-        }
-        gathered += new.len();
-        // Points that both have must agree.
-        for path in rows_files(other)? {
-            let bytes = crate::files::read(&path).map_err(io(&path))?;
-            finished.add(path, bytes)?;
-        }
+        paths.extend(rows_files(other)?);
     }
-    Ok(gathered)
+    let all = Finished::read(sweep.len(), paths)?;
+    all.warnings().iter().for_each(|warning| warn(warning));
+    let new: Vec<usize> = (0..sweep.len()).filter(|&index| !own.has(index) && all.has(index)).collect();
+    if !new.is_empty() {
+        let theirs = all.files().iter().skip(own.files().len());
+        theirs.flat_map(|file| &file.notes).try_for_each(|note| rows.note(note))?;
+    }
+    for row in new.iter().filter_map(|&index| all.row(index)) {
+        rows.append(&row)?;
+    }
+    Ok(new.len())
 }
 
 /// Who computed the rows, on what and in what time, and the scripts that asked for it.

@@ -85,9 +85,8 @@ pub fn run(
 
 /// The files that may hold points of a shard: its own, and those that were not divided the same way.
 fn others_and(rows: &Rows, folder: &Path, shard: Shard) -> Result<Vec<PathBuf>, RowError> {
-    let name = |path: &PathBuf| path.file_name().and_then(|name| name.to_str()).and_then(Shard::of_file);
     let mut paths = rows_files(folder)?;
-    paths.retain(|path| path == rows.path() || name(path).is_none_or(|other| other.count() != shard.count()));
+    paths.retain(|path| path == rows.path() || Shard::of_file(path).is_none_or(|other| other.count() != shard.count()));
     Ok(paths)
 }
 
@@ -96,12 +95,7 @@ fn others_and(rows: &Rows, folder: &Path, shard: Shard) -> Result<Vec<PathBuf>, 
 /// # Errors
 /// [`RowError::Io`] if the folder cannot be read.
 pub fn all_have_begun(folder: &Path, shard: Shard) -> Result<bool, RowError> {
-    let of_division = |path: &PathBuf| {
-        path.file_name()
-            .and_then(|name| name.to_str())
-            .and_then(Shard::of_file)
-            .is_some_and(|other| other.count() == shard.count())
-    };
+    let of_division = |path: &PathBuf| Shard::of_file(path).is_some_and(|other| other.count() == shard.count());
     Ok(rows_files(folder)?.iter().filter(|path| of_division(path)).count() >= shard.count())
 }
 

@@ -1,6 +1,7 @@
 //! A shard of a sweep, and which one a scheduler has given this process.
 
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 
 /// Every `count`-th point, beginning with the `number`-th.
@@ -125,8 +126,9 @@ impl Shard {
         format!("rows-{}-of-{}.csv", self.number, self.count)
     }
 
-    /// The shard that has a file of this name.
-    pub(super) fn of_file(name: &str) -> Option<Self> {
+    /// The shard that a file belongs to, by its name.
+    pub(super) fn of_file(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_str()?;
         let (number, count) = name.strip_prefix("rows-")?.strip_suffix(".csv")?.split_once("-of-")?;
         Self::new(number.parse().ok()?, count.parse().ok()?)
     }
@@ -223,9 +225,9 @@ mod tests {
     #[test]
     fn names_of_files_are_those_of_shards() {
         let shard: Shard = "3/64".parse().unwrap();
-        assert_eq!(Shard::of_file(&shard.file_name()), Some(shard));
+        assert_eq!(Shard::of_file(shard.file_name().as_ref()), Some(shard));
         for name in ["rows-0-of-4.csv", "rows-5-of-4.csv", "rows-gathered.csv", "rows-1-of-x.csv", "results.csv"] {
-            assert_eq!(Shard::of_file(name), None, "{name}");
+            assert_eq!(Shard::of_file(name.as_ref()), None, "{name}");
         }
         for text in ["0/4", "5/4", "1", "1/0", "a/b", ""] {
             assert!(text.parse::<Shard>().is_err(), "{text}");

@@ -84,7 +84,7 @@ impl Status {
         let paths = rows_files(folder)?;
         let finished = Finished::read(points, paths.clone())?;
         let files: Vec<_> = finished.files().iter().map(|file| file_status(file, &finished, points)).collect();
-        let of_files: Vec<Shard> = paths.iter().filter_map(|path| Shard::of_file(path.file_name()?.to_str()?)).collect();
+        let of_files: Vec<Shard> = paths.iter().filter_map(|path| Shard::of_file(path)).collect();
         let shards = shards.or_else(|| of_files.iter().map(|shard| shard.count()).max().filter(|&count| count > 1));
         let begun = of_files.iter().filter(|shard| Some(shard.count()) == shards).count();
         let rates: Vec<f64> = files.iter().filter_map(|file| file.rate_per_s).collect();
@@ -122,7 +122,7 @@ fn file_status(file: &Content, finished: &Finished, points: usize) -> FileStatus
     let elsewhere = begin.is_some_and(|begin| begin.host != host());
     let ended = !matches!(notes.last(), Some(Note::Begin(_)));
     // Rows that were gathered from other folders belong to no shard, and nobody works on them.
-    let complete = Shard::of_file(&name).is_none_or(|shard| shard.of(points).all(|index| finished.has(index)));
+    let complete = Shard::of_file(path).is_none_or(|shard| shard.of(points).all(|index| finished.has(index)));
     let state = match (complete, is_locked(path)) {
         (true, _) => State::Done,
         (false, true) => State::Running,
