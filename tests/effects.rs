@@ -317,6 +317,28 @@ fn a_structural_loss_damps_the_same_at_any_frequency() {
 }
 
 #[test]
+fn a_loss_in_proportion_to_the_bending_is_a_loss_factor_at_any_frequency_and_amplitude() {
+    // A cycle of amplitude A takes 2·(π/2)·η·k·A² = 2π·η·(k·A²/2) of a joint: the response lags by η well below resonance, where friction turns fast.
+    for (frequency, volts) in [(1.0, -1000.0), (3.0, -1000.0), (3.0, -400.0)] {
+        let settings = [
+            format!("drive.frequency_hz={frequency}"),
+            format!("drive.amplitude_v={volts}"),
+            format!("simulation.duration_s={}", 6.0 / frequency),
+        ];
+        let more = ["robot.damping_eta=0", "material.gravity_m_s2=0"];
+        let settings: Vec<&str> = settings.iter().map(String::as_str).chain(more).collect();
+        let lag = |loss: f64| {
+            let run = run(&with(CANTILEVER, "structural-damping", &[("bending_loss_factor", loss)]), &settings);
+            let measures =
+                sfers::recording::measures::Measures::of(&run.recording, sfers::model::Mount::Clamped, Some(1.0 / frequency));
+            measures.tip_phase_deg.unwrap()
+        };
+        let phase = (lag(0.0) - lag(0.02)).to_radians();
+        assert!((phase / 0.02 - 1.0).abs() < 0.1, "{frequency} Hz, {volts} V: {phase}");
+    }
+}
+
+#[test]
 fn softening_lowers_the_frequency_of_large_motion_only() {
     let period = |volts: f64, a: f64| {
         let text = with(CANTILEVER, "stiffness-softening", &[("softening_mm2", a)])
@@ -426,7 +448,11 @@ fn both_engines_bend_alike() {
 #[test]
 fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
     let text = with(&with(CANTILEVER, "hysteresis", &[("width", 0.2)]), "creep", &[("per_decade", 0.02)]);
-    let text = with(&with(&text, "driver-lag", &[("time_constant_s", 0.01)]), "structural-damping", &[("loss_factor", 0.02)]);
+    let text = with(
+        &with(&text, "driver-lag", &[("time_constant_s", 0.01)]),
+        "structural-damping",
+        &[("loss_factor", 0.02), ("bending_loss_factor", 0.02)],
+    );
     let cable = [("stiffness_n_per_m", 3.0), ("level_mm", 2.0), ("drag_mn", 1.0), ("damping_s", 0.01)];
     let text = with(&text, "cable-drag", &cable);
     let text = with(&with(&text, "remanence", &[("share", 0.1), ("coercive_v", 300.0)]), "wake-up", &[("change", -0.1)]);
@@ -462,9 +488,11 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         run(&text, &[])
     };
     type Effects<'a> = &'a [(&'a str, &'a [(&'a str, f64)])];
-    let fifths = |of: &dyn Fn(f64) -> f64| [1, 2, 3, 4, 5].map(|k| of(0.2 * f64::from(k)));
-    // A tenth more than the voltage.
-    let [a, b, c, d, e] = fifths(&|share| -100.0 * share);
+    // Moments at fifths of 4/m: the same everywhere, and (π/2)·η·k·|θ| in mN·m.
+    let moments = ["moment_1_mn_m", "moment_2_mn_m", "moment_3_mn_m", "moment_4_mn_m", "moment_5_mn_m", "moment_6_mn_m"];
+    let even = moments.map(|name| (name, 0.05));
+    let per_fifth = 1e-4 * 0.02 * PI / 2.0 * robot().joint().stiffness * robot().link_length() * 0.008;
+    let rising: Vec<_> = (0..6).map(|k| (moments[k], per_fifth * k as f64)).chain([("bend_range_per_m", 4.0)]).collect();
     // At 10 Hz, 1/(2π·10 Hz) s, as without an exponent.
     let share = |time: f64| 0.05 * (time * 20.0 * std::f64::consts::PI).sqrt();
     let loss = [
@@ -474,15 +502,10 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         ("share_4", share(1e-1)),
         ("share_5", share(1.0)),
     ];
-    let line = [
-        ("low_v", -1000.0),
-        ("high_v", 0.0),
-        ("below_1_v", a),
-        ("below_2_v", b),
-        ("below_3_v", c),
-        ("below_4_v", d),
-        ("below_5_v", e),
-    ];
+    // A tenth more than the voltage.
+    let below = ["below_1_v", "below_2_v", "below_3_v", "below_4_v", "below_5_v", "below_6_v", "below_7_v", "below_8_v"];
+    let ends = [("low_v", -1000.0), ("high_v", 0.0)];
+    let line: Vec<_> = (0..8).map(|k| (below[k], -100.0 * (k + 1) as f64 / 8.0)).chain(ends).collect();
     let soft = |c: f64| [1, 2, 3, 4].map(|k| (COMPLIANCES[k - 1], c));
     let [s1, s2, s3, s4] = soft(0.7);
     let cases: [(Effects, Effects); 13] = [
@@ -523,6 +546,8 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         (&[("free-drag", &[("cubic", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 3.0)])]),
         (&[("free-drag", &[("linear", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.0)])]),
         (&[("free-joint-memory", &loss)], &[("structural-damping", &[("loss_factor", 0.05 * 0.68), ("exponent", -0.5)])]),
+        (&[("free-joint-friction", &even)], &[("dry-friction", &[("moment_mn_m", 0.05)])]),
+        (&[("free-joint-friction", &rising)], &[("structural-damping", &[("bending_loss_factor", 0.02)])]),
     ];
     for (free, named) in cases {
         let (free_run, plain) = (with_all(free), run(CANTILEVER, &[]));

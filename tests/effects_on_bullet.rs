@@ -55,7 +55,7 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 28] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 30] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
@@ -93,6 +93,11 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 28] = [
     ("cable-drag", &[("stiffness_n_per_m", 5.0), ("level_mm", 50.0), ("position_mm", 60.0), ("drag_mn", 2.0)]),
     ("cable-drag", &[("stiffness_n_per_m", 5.0), ("level_mm", -50.0), ("below", 0.0), ("position_mm", 60.0)]),
     ("cable-drag", &[("stiffness_n_per_m", 500.0), ("level_mm", 1.0), ("position_mm", 4.0)]),
+    ("structural-damping", &[("bending_loss_factor", 0.02)]),
+    (
+        "free-joint-friction",
+        &[("bend_range_per_m", 4.0), ("moment_1_mn_m", 0.02), ("moment_3_mn_m", 0.1), ("moment_6_mn_m", 0.05)],
+    ),
 ];
 
 #[test]

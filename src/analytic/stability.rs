@@ -192,9 +192,9 @@ pub fn stable_step_at(robot: &Robot, curvature: f64) -> f64 {
     let link = robot.link_length();
     let slips: f64 = extensions.slips.iter().map(|slip| slip.moment / slip.curvature).sum();
     let stiffness = joint.stiffness * hardening + (extensions.moment_of_curvature.steepest() + slips) / link;
-    let damping = joint.stiffness * joint.damping_time
-        + extensions.dry_friction / DRY_FRICTION_RATE
-        + extensions.moment_of_rate.steepest() / link;
+    let dry = extensions.dry_moment(joint.stiffness, link, curvature * link);
+    let dry = dry.max(extensions.dry_friction + extensions.friction_of_curvature.largest());
+    let damping = joint.stiffness * joint.damping_time + dry / DRY_FRICTION_RATE + extensions.moment_of_rate.steepest() / link;
     let viscous = if robot.mount == Mount::Ground { extensions.stick_slip.viscous } else { 0.0 };
     let below = 0.5 * robot.collision_thickness;
     let mass: f64 = chain.bodies.iter().map(|body| body.mass).sum();

@@ -8,7 +8,7 @@ use super::intervals::Intervals;
 use super::plant::{Model, Term};
 use super::search::{Responses, Scored, Screened, Search, VISIBLE};
 use super::stability::{Standing, standing};
-use super::ties::{Ties, pair_in_place};
+use super::ties::{Ties, pair_in_place, shared};
 use super::unseen::Unseen;
 use super::verdict::Judged;
 
@@ -68,7 +68,9 @@ fn weighed(
     let without_it = search.screened(&without, responses, Some(index));
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
     let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with).unzip();
-    tied_with.extend(set);
+    let (shared, both) = if set.is_none() { shared(search, best, (screened, responses), index).unzip() } else { (None, None) };
+    tied_with.extend(set.into_iter().chain(shared));
+    let pair = pair.or(both);
     Ok(Weighed { without, standing, tied_with, pair })
 }
 

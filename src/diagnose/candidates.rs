@@ -93,6 +93,7 @@ mod tests {
     const VISITED: Visited = Visited {
         volts: [-1500.0, 400.0],
         curvature: 5.0,
+        bend: 8.0,
         rate: 300.0,
         root_moment: 3.0,
         slip_speed: 100.0,
@@ -143,7 +144,7 @@ mod tests {
             let all = candidates(&BENCH, visited);
             all.into_iter().find(|c| c.id == "free-voltage-curve").map(|c| c.parameters.len())
         };
-        assert_eq!((of(&VISITED), of(&one_sided)), (Some(10), Some(5)));
+        assert_eq!((of(&VISITED), of(&one_sided)), (Some(16), Some(8)));
     }
 
     #[test]

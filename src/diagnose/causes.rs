@@ -14,6 +14,10 @@ const LEAST_COST: f64 = 10.0;
 /// A cause takes the place of another with which it is tied if χ² is lower by this.
 const LIKELIER: f64 = 4.0;
 
+/// Replacements that are fitted of each cause, and most causes that are replaced one after the other.
+const REPLACEMENTS: usize = 4;
+const MOST_REPLACED: usize = 2;
+
 /// Result of the search.
 pub(super) struct Causes {
     /// The model with all causes, after the final refit.
@@ -104,7 +108,7 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
     if ids(causes.best.model()) != ids(&before) {
         // None for a model at the edge of what can be simulated, as in `select`.
-        causes.replaced = search.replacements(&causes.best, 4).unwrap_or_default();
+        causes.replaced = search.replacements(&causes.best, REPLACEMENTS).unwrap_or_default();
     }
     causes.coarse_total = causes.best.total();
     Ok(())
@@ -144,13 +148,13 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.backward(best)?;
     }
 
-    let mut replaced: Vec<(usize, Trial)> = Vec::new();
-    for _ in 0..2 {
-        if is_insufficient || best.model().terms.is_empty() {
-            break;
-        }
-        // A model at the edge of what can be simulated has no derivatives to compare others by.
-        replaced = search.replacements(&best, 4).unwrap_or_default();
+    // A model at the edge of what can be simulated has no derivatives to compare others by.
+    let replacements = |search: &Search, best: &Scored| {
+        let has_none = is_insufficient || best.model().terms.is_empty();
+        if has_none { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
+    };
+    let mut replaced = replacements(search, &best);
+    for _ in 0..MOST_REPLACED {
         let better = replaced
             .iter()
             .filter(|(removed, trial)| {
@@ -172,6 +176,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.backward(best)?;
         // A cause in a constant's place lets the constant stay free beside it.
         best = search.with_significant_constants(best)?;
+        replaced = replacements(search, &best);
     }
     let faults_come_last = search.estimator.held_spread.take().is_some();
     if search.measure_noise(&best)? || faults_come_last {

@@ -8,6 +8,7 @@
 //! parameters. Every sum has a fixed order, so results do not depend on the number of threads.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::bench::{self, Columns, Spread};
+use super::blocks::blocks;
 use super::noise::Noise;
 use super::plant::{Model, Nuisance, Plant};
 
@@ -34,8 +36,6 @@ const MOST_ITERATIONS_TO_RANK: usize = 8;
 const LEAST_KEPT: f64 = 0.5;
 /// ... up to this number of steps.
 const MOST_STEPS: usize = 60;
-/// Values in a block over which residuals may be correlated.
-pub(super) const BLOCK: usize = 50;
 
 /// Two-sided 95 % quantiles of Student's distribution of 1, 2, ... degrees of freedom.
 const STUDENT_95: [f64; 12] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179];
@@ -509,7 +509,7 @@ impl<'a> Estimator<'a> {
     }
 
     /// Variance inflation of each coordinate over that of independent noise, by the sandwich estimator: C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against
-    /// C = (JᵀJ)⁻¹, summed over blocks b within which residuals may be correlated. Blocks are 50 values, or whole runs (times R/(R − 1) for R
+    /// C = (JᵀJ)⁻¹, summed over blocks b within which residuals may be correlated. Blocks are those of [`blocks`], or whole runs (times R/(R − 1) for R
     /// runs); the larger ratio counts, and it is at least 1 and at least χ² per value. What exceeds 1 is known from R runs only: it is multiplied by
     /// (t/1.96)² with the 95 % quantile t of Student's distribution of R − 1 degrees of freedom, 1 at least.
     ///
@@ -518,14 +518,12 @@ impl<'a> Estimator<'a> {
     pub fn inflation(&self, model: &Model, runs: &[usize], covariance: &DMatrix<f64>) -> Result<Vec<f64>, DiagnoseError> {
         let (residuals, derivatives) = self.linearised(model, runs, &[])?;
         let n = derivatives.len();
-        let ratios = |block: usize| -> Vec<f64> {
+        let ratios = |blocks: &dyn Fn(usize) -> Vec<Range<usize>>| -> Vec<f64> {
             let mut meat = DMatrix::zeros(n, n);
-            for run in 0..runs.len() {
-                let values = residuals[run].len();
-                for from in (0..values).step_by(block) {
-                    let to = from.saturating_add(block).min(values);
-                    let score =
-                        DVector::from_fn(n, |k, _| (from..to).map(|i| derivatives[k][run][i] * residuals[run][i]).sum::<f64>());
+            for (run, residuals) in residuals.iter().enumerate() {
+                for block in blocks(run) {
+                    let product = |k: usize, i: usize| derivatives[k][run][i] * residuals[i];
+                    let score = DVector::from_fn(n, |k, _| block.clone().map(|i| product(k, i)).sum::<f64>());
                     meat += &score * score.transpose();
                 }
             }
@@ -535,7 +533,8 @@ impl<'a> Estimator<'a> {
         let few = runs.len() as f64 / (runs.len() as f64 - 1.0).max(1.0);
         let count = self.count(runs).max(1) as f64;
         let least = (residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>() / count).max(1.0);
-        let (short, whole) = (ratios(BLOCK), ratios(usize::MAX));
+        let short = ratios(&|run| blocks(&self.plant.signals()[runs[run]], &self.noise, residuals[run].len()));
+        let whole = ratios(&|run| std::iter::once(0..residuals[run].len()).collect());
         let known = (student_95(runs.len().saturating_sub(1)) / 1.96_f64).powi(2);
         // `max` ignores the NaN of a coordinate that the runs do not determine.
         let ratio = |(short, whole): (f64, f64)| 1.0 + known * (least.max(short).max(few * whole) - 1.0);

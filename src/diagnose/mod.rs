@@ -15,6 +15,7 @@ mod adopted;
 #[cfg(feature = "view")]
 pub mod answer;
 pub mod bench;
+mod blocks;
 mod candidates;
 mod causes;
 pub mod combinations;
@@ -25,6 +26,7 @@ mod error;
 pub mod extended;
 mod faults;
 pub mod fit;
+mod forward;
 pub mod identify;
 mod intervals;
 pub mod names;

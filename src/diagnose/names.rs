@@ -59,9 +59,12 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
             Some(_) => "approached softly".into(),
             None => String::new(),
         },
-        "air-drag" | "stiffness-softening" | "structural-damping" | "polarity-asymmetry" => {
-            fitted.nth(1).map_or("", |_| "with an exponent").into()
-        }
+        "structural-damping" => match (fitted.next(), fitted.next()) {
+            (Some("bending_loss_factor"), _) => "in proportion to the bending".into(),
+            (_, Some(_)) => "with an exponent".into(),
+            _ => String::new(),
+        },
+        "air-drag" | "stiffness-softening" | "polarity-asymmetry" => fitted.nth(1).map_or("", |_| "with an exponent").into(),
         "remanence" => fitted.nth(2).map_or("", |_| "that saturates").into(),
         "dry-friction" => fitted.nth(1).map_or("", |_| "with presliding").into(),
         "cable-drag" => {

@@ -1,9 +1,9 @@
-//! Selection of causes: screening, forward selection, backward elimination and replacement.
+//! Selection of causes: screening, backward elimination and replacement. Forward selection is in [`forward`](super::forward).
 //!
 //! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, starts of fits, selection and replacement share the state of one search; its last 140 lines are tests.
+//! The file is long because screening, starts of fits, elimination and replacement share the state of one search; its last 140 lines are tests.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::fit::{BLOCK, Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
+use super::blocks::blocks;
+use super::fit::{Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::projection::{tangents, without_directions};
@@ -27,7 +28,7 @@ const LEAST_SHARE: f64 = 0.004;
 /// ... and by this number of standard errors of the difference, ...
 const LEAST_SIGMAS: f64 = 3.0;
 /// ... and if BIC falls by at least this.
-const LEAST_BIC: f64 = 10.0;
+pub(super) const LEAST_BIC: f64 = 10.0;
 /// Nothing more is sought once no more than this share of what re-tuned constants leave is left, and less than [`VISIBLE`]: further causes would be
 /// minor, and would parcel out what the laws of the others do not follow.
 pub(super) const SOUGHT: f64 = 0.02;
@@ -39,27 +40,24 @@ const SEEN_BY_FIT: f64 = 0.1;
 const CLEARLY: f64 = 3.0;
 /// Two models are tied if their χ² differ by less than this or by less than two standard errors.
 const TIED_CHI2: f64 = 12.0;
-/// Candidates that are fitted after screening: named ones, forms of one cause among them, and free forms.
-const FINALISTS: usize = 7;
+/// Forms of one cause that are fitted after screening.
 const FORMS: usize = 2;
-const FREE_FINALISTS: usize = 3;
-/// Candidates are fitted whose linear estimate is at least this share of the best one's: in a search, among free forms, and in the place of a cause
-/// whose own share is 1.
-const PROMISING: f64 = 0.02;
-const PROMISING_FREE: f64 = 0.4;
+/// Candidates are fitted in the place of a cause whose linear estimate is at least this share of its own.
 pub(super) const PROMISING_IN_PLACE: f64 = 0.3;
 /// Candidates are screened in the place of a cause whose linear estimate from what they do beside it is at least this share of its own.
 const LIKELY_IN_PLACE: f64 = 0.15;
+/// Replacements that leave less than this multiple of what a model leaves get a discretisation of their own.
+const NEARLY: f64 = 2.0;
 /// Terms that are left out on trial in a round of elimination, the least significant ones.
 const LEAST_SIGNIFICANT: usize = 3;
 /// Share of the diagonal by which the linear estimate of a start is regularised.
 const LEAST_RIDGE: f64 = 1e-6;
+/// Cosine of two changes of the residuals from which on they are nearly the same.
+const ALIKE: f64 = 0.9;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
 /// Most alternations between the spread of the bench's faults and the model.
 const MOST_SPREADS: usize = 3;
-/// Most causes in addition to the constants.
-const MOST_CAUSES: usize = 6;
 
 /// A fitted model with its residuals on all runs.
 #[derive(Debug, Clone)]
@@ -153,6 +151,35 @@ pub struct Screened {
     terms: usize,
 }
 
+impl Responses {
+    /// By how much a coordinate of the model moves, to first order, if a term of a screening is added.
+    pub(super) fn shift(&self, term: &Term, coordinate: usize, search: &Search) -> Option<f64> {
+        let (start, change) = self.starts.iter().find(|(start, _)| start.candidate == term.candidate)?;
+        // How far along the line from the start's off value the term is.
+        let parameters = &search.candidate(term).parameters;
+        let shares = start.x.iter().zip(&term.x).zip(parameters);
+        let along = shares
+            .filter_map(|((start, x), free)| Some((x - free.off?) / (start - free.off?)))
+            .find(|along| along.is_finite())?;
+        let columns: Vec<DVector<f64>> = self.derivatives.iter().map(|column| DVector::from_vec(column.concat())).collect();
+        let n = columns.len();
+        let mut information = DMatrix::from_fn(n, n, |i, j| columns[i].dot(&columns[j]));
+        (0..n).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
+        let right = DVector::from_fn(n, |k, _| -along * columns[k].dot(change));
+        Some(information.lu().solve(&right)?[coordinate])
+    }
+
+    /// True if a term of a screening does nearly what a coordinate of the model does, beside the others.
+    pub(super) fn is_alike(&self, term: &Term, coordinate: usize) -> bool {
+        let Some((_, change)) = self.starts.iter().find(|(start, _)| start.candidate == term.candidate) else { return false };
+        let mut others = self.derivatives.clone();
+        let own = DVector::from_vec(others.remove(coordinate).concat());
+        let others = tangents(&others);
+        let [own, change] = [&own, change].map(|column| without_directions(&others, column));
+        own.dot(&change).abs() > ALIKE * own.norm() * change.norm()
+    }
+}
+
 impl Search<'_> {
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
@@ -176,8 +203,12 @@ impl Search<'_> {
 
     /// True if a model has two causes and costs more than the limit.
     pub fn is_given_up(&self, scored: &Scored) -> bool {
-        let causes = scored.model().terms.iter().filter(|term| !self.candidate(term).is_constant).count();
-        causes >= 2 && self.cost(scored) > self.limit
+        self.causes(scored) >= 2 && self.cost(scored) > self.limit
+    }
+
+    /// Number of causes of a model that are no constants.
+    pub(super) fn causes(&self, scored: &Scored) -> usize {
+        scored.model().terms.iter().filter(|term| !self.candidate(term).is_constant).count()
     }
 
     /// Scores a fitted model on all runs.
@@ -254,7 +285,7 @@ impl Search<'_> {
     }
 
     /// [`ranked`](Self::ranked) for a model with terms beyond those that were screened.
-    fn ranked_beyond(&self, model: &Model, screened: &Screened) -> Result<Scored, DiagnoseError> {
+    pub(super) fn ranked_beyond(&self, model: &Model, screened: &Screened) -> Result<Scored, DiagnoseError> {
         let start = self.start_beyond(model, screened)?;
         let known = self.known(screened);
         self.with_spread(self.estimator.fit_beyond(&start, &self.split.fit, &known)?, Convergence::Rank)
@@ -341,17 +372,18 @@ impl Search<'_> {
     pub fn gap(&self, better: &Scored, worse: &Scored, runs: &[usize]) -> (f64, f64) {
         let (mut sum, mut apart, mut structure) = (0.0, 0.0, 0.0);
         for run in runs {
-            for (a, b) in better.residuals[*run].chunks(BLOCK).zip(worse.residuals[*run].chunks(BLOCK)) {
+            let (better, worse) = (&better.residuals[*run], &worse.residuals[*run]);
+            for block in blocks(&self.estimator.plant.signals()[*run], &self.estimator.noise, better.len()) {
                 let mut along = 0.0;
-                for (a, b) in a.iter().zip(b) {
+                for (a, b) in better[block.clone()].iter().zip(&worse[block]) {
                     sum += b * b - a * a;
                     apart += (b - a) * (b - a);
                     along += a * (b - a);
                 }
                 structure += along * along;
             }
-            sum += worse.spread_costs[*run] - better.spread_costs[*run];
         }
+        sum += runs.iter().map(|run| worse.spread_costs[*run] - better.spread_costs[*run]).sum::<f64>();
         (sum / (2.0 * f64::max(apart, structure).sqrt()).max(1e-9), sum)
     }
 
@@ -366,18 +398,13 @@ impl Search<'_> {
         self.estimator.count(runs) as f64 * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
     }
 
-    /// True if a free form is better than a name on the select runs and by BIC.
-    fn is_closer(&self, free: &Scored, named: &Scored) -> bool {
-        self.judged(free) < self.judged(named) && free.bic() < named.bic() - LEAST_BIC
-    }
-
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
-    fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
+    pub(super) fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
         self.is_significant_on(runs, more, less)
     }
 
-    fn is_significant_on(&self, runs: &[usize], more: &Scored, less: &Scored) -> bool {
+    pub(super) fn is_significant_on(&self, runs: &[usize], more: &Scored, less: &Scored) -> bool {
         self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
     }
 
@@ -387,7 +414,7 @@ impl Search<'_> {
     }
 
     /// True if the last term of a model is a free form.
-    fn ends_free(&self, model: &Model) -> bool {
+    pub(super) fn ends_free(&self, model: &Model) -> bool {
         model.terms.last().is_some_and(|term| self.candidate(term).is_free_form)
     }
 
@@ -637,144 +664,9 @@ impl Search<'_> {
         chosen
     }
 
-    /// The best screened candidates fitted on top of `from`, best on select runs first, and the screening.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
-    pub fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
-        (self.progress)("screening all candidates");
-        let screened = self.screen(from)?;
-        let is_basic = |(_, model): &&(f64, Model)| model.terms.last().is_none_or(|term| !self.candidate(term).is_variant);
-        let (free, named): (Vec<_>, Vec<_>) =
-            screened.ranked.iter().filter(is_basic).partition(|(_, model)| self.ends_free(model));
-        let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
-        let most_free = free.first().map_or(0.0, |(gain, _)| *gain);
-        let mut finalists = self.finalists(named.into_iter().filter(|(gain, _)| *gain >= PROMISING * most), FINALISTS);
-        finalists
-            .extend(self.finalists(free.into_iter().filter(|(gain, _)| *gain >= PROMISING_FREE * most_free), FREE_FINALISTS));
-        let mut trials = Vec::new();
-        for model in finalists {
-            let Some(term) = model.terms.last() else { continue };
-            (self.progress)(&format!("fitting {}", self.id(term.candidate)));
-            // A candidate that cannot be fitted is dropped.
-            if let Ok(scored) = self.ranked_beyond(&model, &screened) {
-                trials.push(Trial { candidate: term.candidate, scored });
-            }
-        }
-        // Possible winners are refitted: an unconverged fit may do better on select runs than a converged one.
-        let best = |by: &dyn Fn(&Scored) -> f64, free: bool| {
-            let of_kind = (0..trials.len()).filter(|k| self.ends_free(trials[*k].scored.model()) == free);
-            of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
-        };
-        let judged = |scored: &Scored| self.judged(scored);
-        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false)];
-        // A free form that is no better than a name loses anyway.
-        let is_ahead = |free: &usize| ahead[0].is_none_or(|named| judged(&trials[*free].scored) < judged(&trials[named].scored));
-        ahead.push(best(&judged, true).filter(is_ahead));
-        ahead.dedup();
-        for index in ahead.into_iter().flatten() {
-            let model = trials[index].scored.model().clone();
-            if let Ok(scored) = self.fitted(&model) {
-                trials[index].scored = scored;
-            }
-        }
-        trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
-        Ok((trials, screened))
-    }
-
     /// The criterion of ranking: χ² of the select runs, or BIC where there are none.
     pub fn judged(&self, scored: &Scored) -> f64 {
         if self.split.select.is_empty() { scored.bic() } else { scored.select }
-    }
-
-    /// Forward selection: adds causes while they are worth it. Returns the last model and the first round's trials.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if a model cannot be simulated.
-    pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
-        let mut best = from;
-        let mut first: Option<Vec<Trial>> = None;
-        let mut causes = 0;
-        while causes < MOST_CAUSES && self.is_sought(&best) {
-            causes += 1;
-            let (trials, screened) = self.trials(&best)?;
-            // A free form where it is closer than the best name, so that what the name leaves goes to no other cause.
-            let top_of =
-                |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
-            let top = match (top_of(false).cloned(), top_of(true).cloned()) {
-                (Some(named), Some(free)) if self.is_closer(&free, &named) => {
-                    let last = named.model().terms.len() - 1;
-                    let named = self.with_its_law(named, last);
-                    Some(if self.is_closer(&free, &named) { free } else { named })
-                }
-                (named, free) => named.or(free),
-            };
-            let worthy = match top.filter(|top| self.is_worth(top, &best)) {
-                Some(top) => Some(top),
-                None => self.seen_by_fit_runs(&mut best, &trials).or_else(|| self.both(&screened, &best)),
-            };
-            if let Some(worthy) = &worthy {
-                (self.progress)(&self.adopting(worthy, &best));
-            }
-            let Some(worthy) = worthy else {
-                first.get_or_insert(trials);
-                break;
-            };
-            // The discretisation and the laws are refined before another cause could take their errors.
-            let before = self.estimator.state();
-            let Ok(settled) = self.settle(worthy) else {
-                // A cause with which some run cannot be simulated is none, and the selection ends with those before it.
-                self.estimator.restore(before);
-                first.get_or_insert(trials);
-                break;
-            };
-            best = self.resolve(settled, Convergence::Rank);
-            for index in 0..best.model().terms.len() {
-                best = self.with_its_law(best, index);
-            }
-            if first.is_none() {
-                first = Some(trials);
-            }
-            if self.is_given_up(&best) {
-                break;
-            }
-        }
-        Ok((best, first.unwrap_or_default()))
-    }
-
-    /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
-    fn with_its_law(&self, scored: Scored, index: usize) -> Scored {
-        let term = &scored.model().terms[index];
-        let own = self.candidate(term);
-        if own.is_variant {
-            return self.with_its_plain_law(scored, index);
-        }
-        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
-        let mut best: Option<Scored> = None;
-        for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
-            if variant.id != own.id || !variant.is_variant {
-                continue;
-            }
-            let mut tried: Vec<Vec<f64>> = Vec::new();
-            for start in &variant.starts {
-                // What both laws have in common stays as it is.
-                let x: Vec<f64> = start.iter().zip(&variant.parameters).map(|(x, p)| value(p.name).unwrap_or(*x)).collect();
-                if tried.contains(&x) {
-                    continue;
-                }
-                (self.progress)(&format!("another law of {}", own.id));
-                let mut model = scored.model().clone();
-                model.terms[index] = Term { candidate, x: x.clone() };
-                tried.push(x);
-                let Ok(other) = self.ranked(&model) else { continue };
-                if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
-                    best = Some(other);
-                }
-            }
-        }
-        // A law that cannot be fitted to the end is none.
-        let best = best.and_then(|best| self.fitted(best.model()).ok());
-        best.filter(|best| self.is_significant(best, &scored)).unwrap_or(scored)
     }
 
     /// The model with the plain law of the cause of term `index`, unless its own law is significantly better or the plain one cannot be fitted.
@@ -810,7 +702,7 @@ impl Search<'_> {
     }
 
     /// True if more is sought: a model leaves a visible share of what re-tuned constants leave, or more than half the noise.
-    fn is_sought(&self, scored: &Scored) -> bool {
+    pub(super) fn is_sought(&self, scored: &Scored) -> bool {
         self.share_left(scored) > SOUGHT || self.above(scored) > VISIBLE
     }
 
@@ -822,61 +714,18 @@ impl Search<'_> {
     }
 
     /// χ² of the select runs, or of the fit runs where there are none.
-    fn chi2_to_judge_by(&self, scored: &Scored) -> (f64, &[usize]) {
+    pub(super) fn chi2_to_judge_by(&self, scored: &Scored) -> (f64, &[usize]) {
         if self.split.select.is_empty() { (scored.fitted, &self.split.fit) } else { (scored.select, &self.split.select) }
     }
 
-    /// The adoption of a model's last term, in words.
-    fn adopting(&self, worthy: &Scored, best: &Scored) -> String {
-        let (after, runs) = self.chi2_to_judge_by(worthy);
-        let count = self.estimator.count(runs).max(1) as f64;
-        let name = worthy.model().terms.last().map_or("nothing", |term| self.id(term.candidate));
-        format!("adopting {name}: χ² per value from {:.2} to {:.2}", self.chi2_to_judge_by(best).0 / count, after / count)
-    }
-
-    /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.
-    fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
-        // Other pairs are found one cause at a time.
-        let least = 2.0 * screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
-        let (_, pair) = self.sets(base.model(), screened, 2, |_| true).into_iter().find(|(gain, _)| *gain > least)?;
-        if let [.., first, second] = &pair.terms[..] {
-            (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
-        }
-        let both = self.ranked_beyond(&pair, screened).ok().filter(|both| self.is_worth(both, base))?;
-        self.fitted(both.model()).ok()
-    }
-
     /// True if the fit runs need what `less` leaves out.
-    fn is_seen_by_fit(&self, more: &Scored, less: &Scored) -> bool {
+    pub(super) fn is_seen_by_fit(&self, more: &Scored, less: &Scored) -> bool {
         less.fitted - more.fitted > self.least_seen()
     }
 
     /// Least rise of χ² by which the fit runs need a cause.
     fn least_seen(&self) -> f64 {
         SEEN_BY_FIT.max(LEAST_SHARE * self.unexplained) * self.estimator.count(&self.split.fit) as f64
-    }
-
-    /// A cause that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
-    /// too. Keeps the new split if it does.
-    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
-        let named = trials.iter().filter(|trial| !self.ends_free(trial.scored.model()));
-        let trial = named.min_by(|a, b| a.scored.fitted.total_cmp(&b.scored.fitted))?;
-        let gain = |run: &usize| sum_of_squares(&base.residuals[*run]) - sum_of_squares(&trial.scored.residuals[*run]);
-        let most = self.split.fit.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b)));
-        let run = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base))?;
-        (self.progress)(&format!("{} on another split", self.id(trial.candidate)));
-        let before = self.split.clone();
-        self.split.fit.retain(|other| *other != run);
-        self.split.select.push(run);
-        self.split.select.sort_unstable();
-        if let (Ok(plain), Ok(with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
-            && self.is_worth(&with, &plain)
-        {
-            *base = plain;
-            return Some(with);
-        }
-        self.split = before;
-        None
     }
 
     /// Backward elimination: removes terms that are not worth it, the least needed first.
@@ -993,17 +842,29 @@ impl Search<'_> {
             let is_law = |c: &Candidate| c.id == self.id(removed.candidate) && !c.is_free_form;
             let is_likely = |at: usize, c: &Candidate| at != removed.candidate && (likely.contains(&at) || is_law(c));
             let screened = self.screened(&without, &self.responses(without.model(), is_likely)?, None);
-            let is_promising = |(gain, _): &&(f64, Model)| *gain >= PROMISING_IN_PLACE * own;
-            // One law of each cause: the others are tried once it has the place.
-            for model in first_of_each(screened.ranked.iter().filter(is_promising), most, |term| self.id(term.candidate)) {
-                let Some(term) = model.terms.last() else { continue };
-                let candidate = term.candidate;
-                if let Ok(scored) = self.ranked_beyond(&model, &screened) {
-                    found.push((removed.candidate, Trial { candidate, scored }));
+            let promising: Vec<_> = screened.ranked.iter().filter(|(gain, _)| *gain >= PROMISING_IN_PLACE * own).collect();
+            // One law of each cause, the plain one if it is promising: the others are tried once it has the place.
+            for model in first_of_each(promising.iter().copied(), most, |term| self.id(term.candidate)) {
+                let candidate_of = |model: &Model| model.terms.last().map(|term| self.candidate(term));
+                let Some(id) = candidate_of(&model).map(|own| own.id) else { continue };
+                let is_plain = |(_, other): &&&(f64, Model)| {
+                    candidate_of(other).is_some_and(|c| c.id == id && (!c.is_variant || id == self.id(removed.candidate)))
+                };
+                let model = promising.iter().find(is_plain).map_or(&model, |(_, plain)| plain);
+                let Some(candidate) = model.terms.last().map(|term| term.candidate) else { continue };
+                if let Ok(scored) = self.ranked_beyond(model, &screened) {
+                    found.push((removed.candidate, Trial { candidate, scored: self.in_its_resolution(scored, best) }));
                 }
             }
         }
         Ok(found)
+    }
+
+    /// A replacement in the discretisation that suits it, if it leaves little more than `best`, which leaves something: that of `best` may stand for what a wrong
+    /// cause lacks.
+    fn in_its_resolution(&self, trial: Scored, best: &Scored) -> Scored {
+        let left = self.above(best);
+        if left > LEAST_GAIN && self.above(&trial) < NEARLY * left { self.resolve(trial, Convergence::Rank) } else { trial }
     }
 
     /// The discretisation with the least χ² over all runs, by steps from the present one. To rank models, steps end where they lower χ² by less than half

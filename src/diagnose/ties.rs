@@ -1,12 +1,15 @@
 //! Ties: other causes, or two others together, that explain the data as well as an adopted one.
 
+use super::fit::coordinates;
 use super::plant::{Model, Term};
-use super::search::{Scored, Screened, Search, Trial};
+use super::search::{LEAST_BIC, Responses, Scored, Screened, Search, Trial};
 
 /// Replacements are refitted like the best model if their χ² exceeds its own by no more than this.
 const NEAR_TIE: f64 = 500.0;
 /// Two causes together are fitted in the place of one if their linear estimate is at least this share of what it takes.
 const PROMISING_PAIR: f64 = 0.9;
+/// A cause shares its place with another one if that moves its first parameter by this share of the distance from where it has no effect.
+const LEAST_MOVED: f64 = 0.25;
 
 /// A replacement of an adopted cause.
 struct Replacement {
@@ -28,17 +31,19 @@ impl Ties {
     pub(super) fn new(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_total: f64) -> Self {
         let compared = |(removed, trial): &(usize, Trial)| {
             let index = best.model().terms.iter().position(|term| term.candidate == *removed)?;
-            let (terms, of_best) = (&trial.scored.model().terms, &best.model().terms);
-            let is_of_best = |term: &Term| of_best.iter().any(|own| own.candidate == term.candidate);
-            let has_others =
-                terms.len() == of_best.len() && terms.iter().filter(|term| term.candidate != trial.candidate).all(is_of_best);
-            if !has_others || search.id(*removed) == search.id(trial.candidate) {
+            let own = trial.scored.model().terms.iter().find(|term| term.candidate == trial.candidate)?;
+            let is_there = best.model().terms.iter().any(|term| search.id(term.candidate) == search.id(trial.candidate));
+            if is_there {
                 return None;
             }
-            let is_near = trial.scored.freedom() <= best.freedom() && trial.scored.total() < coarse_total + NEAR_TIE;
-            let Model { resolution, fine, .. } = *best.model();
-            let again = || search.fitted(&Model { resolution, fine, ..trial.scored.model().clone() }).ok();
-            Some(match is_near.then(again).flatten() {
+            // The final elimination may have left out terms that the trial has.
+            let in_trial =
+                |term: &Term| trial.scored.model().terms.iter().find(|other| other.candidate == term.candidate).cloned();
+            let terms = best.model().terms.iter().enumerate();
+            let terms = terms.map(|(at, term)| if at == index { own.clone() } else { in_trial(term).unwrap_or(term.clone()) });
+            let model = Model { terms: terms.collect(), ..best.model().clone() };
+            let is_near = coordinates(&model).len() <= best.freedom() && trial.scored.total() < coarse_total + NEAR_TIE;
+            Some(match is_near.then(|| search.fitted(&model).ok()).flatten() {
                 Some(scored) => {
                     let is_tied = search.is_tied(best, &scored);
                     Replacement { index, trial: Trial { scored, ..trial.clone() }, is_tied }
@@ -72,7 +77,8 @@ impl Ties {
 
     /// The terms that are tied with an adopted one.
     pub(super) fn terms(&self) -> Vec<&Term> {
-        self.models().filter_map(|scored| scored.model().terms.last()).collect()
+        let tied = self.replacements.iter().filter(|other| other.is_tied);
+        tied.filter_map(|other| other.trial.scored.model().terms.get(other.index)).collect()
     }
 }
 
@@ -126,6 +132,42 @@ fn beside_plain_law(
     let (_, model) = screened.ranked.iter().find(|(gain, model)| *gain > promising && is_other(model))?;
     let set = in_words(own, search.id(model.terms.last()?.candidate));
     tied_model(search, best, model, &screened).map(|both| (set, both))
+}
+
+/// A cause with another one beside it that does much of its work: the other one lowers χ² beyond chance, if not by as much as is worth a cause, and moves the
+/// first parameter of term `index` of `best` by [`LEAST_MOVED`]. Their ids with a plus sign, and the model with both; none if there is none.
+pub(super) fn shared(
+    search: &Search,
+    best: &Scored,
+    (screened, responses): (&Screened, &Responses),
+    index: usize,
+) -> Option<(String, Model)> {
+    let own = search.candidate(&best.model().terms[index]);
+    let (at, off) = own.parameters.iter().enumerate().find_map(|(k, free)| Some((k, free.off?)))?;
+    if own.is_free_form {
+        return None;
+    }
+    let moved = |model: &Model| {
+        let x = model.terms[index].x[at];
+        (x - best.model().terms[index].x[at]).abs() / (best.model().terms[index].x[at] - off).abs().max(f64::MIN_POSITIVE)
+    };
+    let coordinate = coordinates(best.model()).iter().position(|of| *of == (index, at))?;
+    let is_law = |term: &Term| !search.candidate(term).is_free_form && !search.candidate(term).is_variant;
+    let promising = screened.ranked.iter().filter(|(gain, _)| *gain > LEAST_BIC);
+    let mut shares = promising.filter_map(|(_, model)| {
+        let term = model.terms.last().filter(|term| is_law(term) && search.id(term.candidate) != own.id)?;
+        let by = responses.shift(term, coordinate, search)?;
+        let mut with = best.model().clone();
+        with.terms[index].x[at] += by;
+        (moved(&with) > LEAST_MOVED || responses.is_alike(term, coordinate)).then_some(model)
+    });
+    let model = shares.next()?;
+    let other = search.id(model.terms.last()?.candidate);
+    (search.progress)(&format!("{other} beside {}", own.id));
+    let start = search.start_beyond(model, screened).ok()?;
+    let both = search.fitted_at_its_spread(&start).ok()?;
+    let is_shared = moved(both.model()) > LEAST_MOVED && search.is_significant_on(&search.split.all(), &both, best);
+    is_shared.then(|| (in_words(own.id, other), both.model().clone()))
 }
 
 /// Two ids in alphabetic order, with a plus sign.

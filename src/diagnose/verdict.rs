@@ -2,7 +2,7 @@
 
 use super::DiagnoseError;
 use super::adopted::estimates;
-use super::fit::BLOCK;
+use super::blocks::BLOCK;
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Term};

@@ -19,6 +19,8 @@ pub(super) struct Visited {
     pub(super) volts: [f64; 2],
     /// Largest elastic curvature of the nominal robot (1/m).
     pub(super) curvature: f64,
+    /// Largest curvature of the nominal robot (1/m).
+    pub(super) bend: f64,
     /// Largest rate of curvature of the nominal robot (1/(m·s)).
     pub(super) rate: f64,
     /// Largest moment on the root of the nominal robot (mN·m).
@@ -36,6 +38,7 @@ impl Visited {
     pub(super) const NOTHING: Self = Self {
         volts: [0.0; 2],
         curvature: LEAST,
+        bend: LEAST,
         rate: LEAST,
         root_moment: LEAST,
         slip_speed: 1.0,
@@ -51,6 +54,7 @@ impl Visited {
             "span_v" => Some((self.volts[1] - self.volts[0]).max(1.0)),
             "low_per_m" => Some(-self.curvature),
             "high_per_m" | "range_per_m" => Some(self.curvature),
+            "bend_range_per_m" => Some(self.bend),
             "range_per_m_s" => Some(self.rate),
             "range_mm_s" => Some(self.slip_speed),
             "range_mm" => Some(self.coordinate),
@@ -93,18 +97,18 @@ pub(super) fn visited(runs: &[Visit]) -> Result<Visited, EngineError> {
         volts = [volts[0].min(*v), volts[1].max(*v)];
     }
     let largest = runs.par_iter().map(extremes).collect::<Result<Vec<_>, _>>()?;
-    let in_units = [100.0, 100.0, 1e-4, 10.0];
-    let mut most = [LEAST; 4];
+    let in_units = [100.0, 100.0, 1e-4, 10.0, 100.0];
+    let mut most = [LEAST; 5];
     for of_run in &largest {
-        most = [0, 1, 2, 3].map(|k| f64::max(most[k], in_units[k] * of_run[k]));
+        most = [0, 1, 2, 3, 4].map(|k| f64::max(most[k], in_units[k] * of_run[k]));
     }
-    let [curvature, rate, root_moment, slip_speed] = most;
-    Ok(Visited { volts, curvature, rate, root_moment, slip_speed, ..Visited::NOTHING })
+    let [curvature, rate, root_moment, slip_speed, bend] = most;
+    Ok(Visited { volts, curvature, bend, rate, root_moment, slip_speed, ..Visited::NOTHING })
 }
 
-/// Largest elastic curvature of a joint (1/cm), largest rate of curvature (1/(cm·s)), largest moment on the root (dyn·cm) and largest slip speed (cm/s) in a
-/// run. Nodes near the floor slip.
-fn extremes(run: &Visit) -> Result<[f64; 4], EngineError> {
+/// Largest elastic curvature of a joint (1/cm), largest rate of curvature (1/(cm·s)), largest moment on the root (dyn·cm), largest slip speed (cm/s) and
+/// largest curvature (1/cm) in a run. Nodes near the floor slip.
+fn extremes(run: &Visit) -> Result<[f64; 5], EngineError> {
     let Visit { robot, start, drive, step: h, steps } = run;
     let h = *h;
     let drive = Drive { waveform: Waveform::Table(drive.clone()), positive_gain: 1.0, delay: 0.0 };
@@ -116,7 +120,7 @@ fn extremes(run: &Visit) -> Result<[f64; 4], EngineError> {
     let (link, per_volt) = (robot.link_length(), robot.joint().rest_angle_per_volt);
     // A load that is spread evenly makes this of the first joint's moment at the root, half a link before it.
     let to_root = (1.0 - 0.5 / robot.joints() as f64).powi(-2);
-    let mut largest = [0.0_f64; 4];
+    let mut largest = [0.0_f64; 5];
     let nodes = if robot.mount == Mount::Ground { 3 * (robot.joints() + 2) } else { 0 };
     let (mut positions, mut velocities) = (vec![0.0; nodes], vec![0.0; nodes]);
     for step in 0..*steps {
@@ -133,6 +137,7 @@ fn extremes(run: &Visit) -> Result<[f64; 4], EngineError> {
         for ((angle, rate), volts) in joints.angles.iter().zip(&joints.rates).zip(&joints.motor_voltages) {
             largest[0] = largest[0].max((angle - per_volt * volts).abs() / link);
             largest[1] = largest[1].max(rate.abs() / link);
+            largest[4] = largest[4].max(angle.abs() / link);
         }
     }
     Ok(largest)

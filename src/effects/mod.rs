@@ -163,6 +163,7 @@ pub static EFFECTS: &[&Effect] = &[
     &structure::FREE_MOMENT_OF_DEVIATION,
     &structure::FREE_MOMENT_OF_RATE,
     &structure::FREE_JOINT_MEMORY,
+    &structure::FREE_JOINT_FRICTION,
     &structure::FREE_JOINT_SLIP,
     &structure::FREE_STIFFNESS_ALONG,
     &structure::FREE_MASS,

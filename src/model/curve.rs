@@ -1,37 +1,36 @@
 //! A smooth curve through the origin, linear in its values.
 
-/// Points on each side of the origin.
+/// Points on each side of the origin of a joint's curves.
 pub const CURVE_POINTS: usize = 5;
 
-/// A piecewise cubic with a continuous slope through the origin and [`CURVE_POINTS`] points on each side; beyond them it goes on straight. The slope at
+/// A piecewise cubic with a continuous slope through the origin and `POINTS` points on each side; beyond them it goes on straight. The slope at
 /// a point is that of the parabola through it and its neighbours (Catmull and Rom 1974 for equidistant points), at the origin that of the chord
 /// between its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Curve {
+pub struct Curve<const POINTS: usize = CURVE_POINTS> {
     /// Negative and positive side.
-    sides: [Side; 2],
+    sides: [Side<POINTS>; 2],
     is_zero: bool,
 }
 
 /// One side, by the distance from the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Side {
+struct Side<const POINTS: usize> {
     /// Distances of the points, from the origin outwards; 0 for a side without points.
-    knots: [f64; CURVE_POINTS],
+    knots: [f64; POINTS],
     /// Values there.
-    values: [f64; CURVE_POINTS],
+    values: [f64; POINTS],
     /// Coefficients of the cubics between the points, in the distance from the inner one.
-    cubics: [[f64; 4]; CURVE_POINTS],
+    cubics: [[f64; 4]; POINTS],
     /// Slope beyond the last point, over the distance.
     last: f64,
 }
 
-impl Side {
-    const EMPTY: Self =
-        Self { knots: [0.0; CURVE_POINTS], values: [0.0; CURVE_POINTS], cubics: [[0.0; 4]; CURVE_POINTS], last: 0.0 };
+impl<const POINTS: usize> Side<POINTS> {
+    const EMPTY: Self = Self { knots: [0.0; POINTS], values: [0.0; POINTS], cubics: [[0.0; 4]; POINTS], last: 0.0 };
 
     /// A side with its slope at the origin over the distance.
-    fn new(knots: [f64; CURVE_POINTS], values: [f64; CURVE_POINTS], origin: f64) -> Self {
+    fn new(knots: [f64; POINTS], values: [f64; POINTS], origin: f64) -> Self {
         if knots[0] == 0.0 {
             return Self { last: origin, ..Self::EMPTY };
         }
@@ -40,21 +39,21 @@ impl Side {
         let secant = |k: usize| (at(k + 1)[1] - at(k)[1]) / width(k);
         let slope = |k: usize| match k {
             0 => origin,
-            CURVE_POINTS => secant(CURVE_POINTS - 1),
+            _ if k == POINTS => secant(POINTS - 1),
             _ => (width(k) * secant(k - 1) + width(k - 1) * secant(k)) / (width(k - 1) + width(k)),
         };
         let cubic = |k: usize| {
             let (h, rise, p, q) = (width(k), secant(k), slope(k), slope(k + 1));
             [at(k)[1], p, (3.0 * rise - 2.0 * p - q) / h, (p + q - 2.0 * rise) / (h * h)]
         };
-        Self { knots, values, cubics: std::array::from_fn(cubic), last: slope(CURVE_POINTS) }
+        Self { knots, values, cubics: std::array::from_fn(cubic), last: slope(POINTS) }
     }
 
     /// Value and slope at a distance.
     fn at(&self, distance: f64) -> [f64; 2] {
-        let end = self.knots[CURVE_POINTS - 1];
+        let end = self.knots[POINTS - 1];
         if distance >= end {
-            return [self.values[CURVE_POINTS - 1] + self.last * (distance - end), self.last];
+            return [self.values[POINTS - 1] + self.last * (distance - end), self.last];
         }
         let k = self.knots.iter().take_while(|knot| distance >= **knot).count();
         let t = distance - if k == 0 { 0.0 } else { self.knots[k - 1] };
@@ -63,13 +62,13 @@ impl Side {
     }
 }
 
-impl Curve {
+impl<const POINTS: usize> Curve<POINTS> {
     /// 0 everywhere.
     pub const ZERO: Self = Self { sides: [Side::EMPTY; 2], is_zero: true };
 
     /// A curve through the points at `knots` (distances from the origin, from there outwards; 0 for a side without points) on the negative and the
     /// positive side, with its `values` there.
-    pub fn new(knots: [[f64; CURVE_POINTS]; 2], values: [[f64; CURVE_POINTS]; 2]) -> Self {
+    pub fn new(knots: [[f64; POINTS]; 2], values: [[f64; POINTS]; 2]) -> Self {
         let width = knots[0][0] + knots[1][0];
         let first = |side: usize| if knots[side][0] > 0.0 { values[side][0] } else { 0.0 };
         let origin = if width > 0.0 { (first(1) - first(0)) / width } else { 0.0 };
@@ -78,23 +77,23 @@ impl Curve {
     }
 
     /// A curve through equidistant points up to the distances `ends` on the negative and the positive side; 0 for a side without points.
-    pub fn equidistant(ends: [f64; 2], values: [[f64; CURVE_POINTS]; 2]) -> Self {
-        Self::new(ends.map(|end| std::array::from_fn(|k| end * (k + 1) as f64 / CURVE_POINTS as f64)), values)
+    pub fn equidistant(ends: [f64; 2], values: [[f64; POINTS]; 2]) -> Self {
+        Self::new(ends.map(|end| std::array::from_fn(|k| end * (k + 1) as f64 / POINTS as f64)), values)
     }
 
     /// An odd curve up to ±`end`, whose points are equidistant in asinh(x/`warp`): they are close together about the origin. 0 everywhere if `end` is 0.
-    pub fn odd(end: f64, values: [f64; CURVE_POINTS], warp: f64) -> Self {
+    pub fn odd(end: f64, values: [f64; POINTS], warp: f64) -> Self {
         if end == 0.0 {
             return Self::ZERO;
         }
-        let step = (end / warp).asinh() / CURVE_POINTS as f64;
-        let knots = std::array::from_fn(|k| if k + 1 == CURVE_POINTS { end } else { warp * (step * (k + 1) as f64).sinh() });
+        let step = (end / warp).asinh() / POINTS as f64;
+        let knots = std::array::from_fn(|k| if k + 1 == POINTS { end } else { warp * (step * (k + 1) as f64).sinh() });
         Self::new([knots; 2], [values.map(|value| -value), values])
     }
 
     /// Distances of the last points on the negative and the positive side from the origin; 0 for a side without points.
     pub fn ends(&self) -> [f64; 2] {
-        [0, 1].map(|side| self.sides[side].knots[CURVE_POINTS - 1])
+        [0, 1].map(|side| self.sides[side].knots[POINTS - 1])
     }
 
     /// True if it is 0 everywhere.
@@ -109,7 +108,7 @@ impl Curve {
 
     /// The steepest rise between the last points: a cubic is steepest at its ends or where its second derivative is 0.
     pub fn steepest(&self) -> f64 {
-        let of = |(sign, side): (f64, &Side)| {
+        let of = |(sign, side): (f64, &Side<POINTS>)| {
             let mut steepest = (sign * side.last).max(0.0);
             let mut inner = 0.0;
             for (outer, [_, b, c, d]) in side.knots.iter().zip(side.cubics) {
@@ -134,7 +133,7 @@ impl Curve {
     }
 }
 
-fn largest(sides: &[Side; 2]) -> f64 {
+fn largest<const POINTS: usize>(sides: &[Side<POINTS>; 2]) -> f64 {
     sides.iter().flat_map(|side| side.values).fold(0.0, |largest, value| value.abs().max(largest))
 }
 
@@ -174,6 +173,6 @@ mod tests {
     fn a_side_without_points_goes_on_straight() {
         let half = Curve::equidistant([0.0, 5.0], [[0.0; 5], [2.0, 4.0, 6.0, 8.0, 10.0]]);
         assert!((half.at(-3.0)[0] + 6.0).abs() < 1e-12 && (half.at(2.5)[0] - 5.0).abs() < 1e-12);
-        assert!(Curve::ZERO.is_zero() && Curve::ZERO.at(3.0) == [0.0; 2]);
+        assert!(Curve::<8>::ZERO.is_zero() && Curve::<8>::ZERO.at(3.0) == [0.0; 2]);
     }
 }

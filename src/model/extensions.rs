@@ -43,6 +43,10 @@ pub struct Extensions {
     pub softening_exponent: f64,
     /// Moment of dry friction in every joint (dyn·cm).
     pub dry_friction: f64,
+    /// Moment of dry friction (dyn·cm) of a joint against the size of its curvature (1/cm), beside `dry_friction`.
+    pub friction_of_curvature: Curve,
+    /// The same as a share of the joint's stiffness times its angle (–): Reid's damping.
+    pub friction_of_bending: f64,
     /// Moment (dyn·cm) of a joint against its elastic curvature (1/cm), beside the linear one.
     pub moment_of_curvature: Curve,
     /// Moment (dyn·cm) of a joint against the rate of its curvature (1/(cm·s)), beside the linear one.
@@ -171,6 +175,8 @@ impl Default for Extensions {
             softening: 0.0,
             softening_exponent: 2.0,
             dry_friction: 0.0,
+            friction_of_curvature: Curve::ZERO,
+            friction_of_bending: 0.0,
             moment_of_curvature: Curve::ZERO,
             moment_of_rate: Curve::ZERO,
             slips: Vec::new(),
@@ -219,11 +225,21 @@ impl Extensions {
     /// Whether the joints' torque law has terms beyond eq. 1.
     pub fn bends_torque_law(&self) -> bool {
         self.softening != 0.0
-            || self.dry_friction != 0.0
+            || self.has_dry_friction()
             || self.has_loss()
             || !self.slips.is_empty()
             || !self.moment_of_curvature.is_zero()
             || !self.moment_of_rate.is_zero()
+    }
+
+    /// Whether joints have dry friction.
+    pub fn has_dry_friction(&self) -> bool {
+        self.dry_friction != 0.0 || self.has_friction_of_bending()
+    }
+
+    /// Whether the dry friction of a joint depends on its angle.
+    pub fn has_friction_of_bending(&self) -> bool {
+        self.friction_of_bending != 0.0 || !self.friction_of_curvature.is_zero()
     }
 
     /// Whether friction depends on the sliding speed.
@@ -250,11 +266,20 @@ impl Extensions {
         0.5 * AIR_DENSITY * width * DRAG_SPEED * (linear + ratio * (quadratic + ratio * cubic) + other)
     }
 
-    /// Torque of a joint beyond eq. 1 (dyn·cm) at the elastic angle `delta` (rad) and the rate (rad/s), for a joint of stiffness `k`
+    /// Torque of a joint beyond eq. 1 (dyn·cm) at the angle and the elastic angle `delta` (rad) and the rate (rad/s), for a joint of stiffness `k`
     /// (dyn·cm/rad) that stands for the length `link` (cm): softening, curves and dry friction.
-    pub fn torque(&self, k: f64, link: f64, delta: f64, rate: f64) -> f64 {
+    pub fn torque(&self, k: f64, link: f64, [angle, delta]: [f64; 2], rate: f64) -> f64 {
         let softened = k * delta * self.softened(delta / link).min(1.0 - LEAST_STIFFNESS);
-        softened - self.moment_of_curvature.at(delta / link)[0] - self.friction(link, rate)[0]
+        softened - self.moment_of_curvature.at(delta / link)[0] - self.friction(link, self.dry_moment(k, link, angle), rate)[0]
+    }
+
+    /// Moment of dry friction (dyn·cm) of a joint of stiffness `k` (dyn·cm/rad) that stands for the length `link` (cm) at an angle (rad).
+    pub fn dry_moment(&self, k: f64, link: f64, angle: f64) -> f64 {
+        if !self.has_friction_of_bending() {
+            return self.dry_friction;
+        }
+        let of_curvature = self.friction_of_curvature.at(angle.abs() / link)[0];
+        (self.dry_friction + self.friction_of_bending * k * angle.abs() + of_curvature).max(0.0)
     }
 
     /// The share of a joint's stiffness that softening takes at an elastic curvature (1/cm), before its limit.
@@ -267,13 +292,13 @@ impl Extensions {
         }
     }
 
-    /// Moment against a joint's rate (rad/s) and its derivative (dyn·cm, dyn·cm·s): dry friction and the curve of the rate.
-    pub fn friction(&self, link: f64, rate: f64) -> [f64; 2] {
+    /// Moment against a joint's rate (rad/s) and its derivative (dyn·cm, dyn·cm·s): dry friction of the moment `dry` and the curve of the rate.
+    pub fn friction(&self, link: f64, dry: f64, rate: f64) -> [f64; 2] {
         let [mut moment, mut slope] = [0.0; 2];
-        if self.dry_friction != 0.0 {
+        if dry != 0.0 {
             let share = (rate / DRY_FRICTION_RATE).tanh();
-            moment = self.dry_friction * share;
-            slope = self.dry_friction / DRY_FRICTION_RATE * (1.0 - share * share);
+            moment = dry * share;
+            slope = dry / DRY_FRICTION_RATE * (1.0 - share * share);
         }
         if !self.moment_of_rate.is_zero() {
             let [value, tangent] = self.moment_of_rate.at(rate / link);

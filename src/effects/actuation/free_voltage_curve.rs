@@ -7,16 +7,22 @@
 //! # Parameters
 //! * `low_v` (V): lowest voltage of the curve
 //! * `high_v` (V): highest voltage of the curve
-//! * `below_1_v` (V): c at 1/5 of the range below 0
-//! * `below_2_v` (V): c at 2/5 of the range below 0
-//! * `below_3_v` (V): c at 3/5 of the range below 0
-//! * `below_4_v` (V): c at 4/5 of the range below 0
-//! * `below_5_v` (V): c at 5/5 of the range below 0
-//! * `above_1_v` (V): c at 1/5 of the range above 0
-//! * `above_2_v` (V): c at 2/5 of the range above 0
-//! * `above_3_v` (V): c at 3/5 of the range above 0
-//! * `above_4_v` (V): c at 4/5 of the range above 0
-//! * `above_5_v` (V): c at 5/5 of the range above 0
+//! * `below_1_v` (V): c at 1/8 of the range below 0
+//! * `below_2_v` (V): c at 2/8 of the range below 0
+//! * `below_3_v` (V): c at 3/8 of the range below 0
+//! * `below_4_v` (V): c at 4/8 of the range below 0
+//! * `below_5_v` (V): c at 5/8 of the range below 0
+//! * `below_6_v` (V): c at 6/8 of the range below 0
+//! * `below_7_v` (V): c at 7/8 of the range below 0
+//! * `below_8_v` (V): c at 8/8 of the range below 0
+//! * `above_1_v` (V): c at 1/8 of the range above 0
+//! * `above_2_v` (V): c at 2/8 of the range above 0
+//! * `above_3_v` (V): c at 3/8 of the range above 0
+//! * `above_4_v` (V): c at 4/8 of the range above 0
+//! * `above_5_v` (V): c at 5/8 of the range above 0
+//! * `above_6_v` (V): c at 6/8 of the range above 0
+//! * `above_7_v` (V): c at 7/8 of the range above 0
+//! * `above_8_v` (V): c at 8/8 of the range above 0
 //!
 //! # Source
 //! Restoring-force surface: Masri and Caughey, J. Appl. Mech. 46 (1979) 433; cubic through points: Catmull and Rom 1974.
@@ -58,7 +64,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 1/5 of the range below 0",
+            about: "c at 1/8 of the range below 0",
         },
         Parameter {
             name: "below_2_v",
@@ -66,7 +72,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 2/5 of the range below 0",
+            about: "c at 2/8 of the range below 0",
         },
         Parameter {
             name: "below_3_v",
@@ -74,7 +80,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 3/5 of the range below 0",
+            about: "c at 3/8 of the range below 0",
         },
         Parameter {
             name: "below_4_v",
@@ -82,7 +88,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 4/5 of the range below 0",
+            about: "c at 4/8 of the range below 0",
         },
         Parameter {
             name: "below_5_v",
@@ -90,7 +96,31 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 5/5 of the range below 0",
+            about: "c at 5/8 of the range below 0",
+        },
+        Parameter {
+            name: "below_6_v",
+            unit: "V",
+            bounds: [-3000.0, 3000.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "c at 6/8 of the range below 0",
+        },
+        Parameter {
+            name: "below_7_v",
+            unit: "V",
+            bounds: [-3000.0, 3000.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "c at 7/8 of the range below 0",
+        },
+        Parameter {
+            name: "below_8_v",
+            unit: "V",
+            bounds: [-3000.0, 3000.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "c at 8/8 of the range below 0",
         },
         Parameter {
             name: "above_1_v",
@@ -98,7 +128,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 1/5 of the range above 0",
+            about: "c at 1/8 of the range above 0",
         },
         Parameter {
             name: "above_2_v",
@@ -106,7 +136,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 2/5 of the range above 0",
+            about: "c at 2/8 of the range above 0",
         },
         Parameter {
             name: "above_3_v",
@@ -114,7 +144,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 3/5 of the range above 0",
+            about: "c at 3/8 of the range above 0",
         },
         Parameter {
             name: "above_4_v",
@@ -122,7 +152,7 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 4/5 of the range above 0",
+            about: "c at 4/8 of the range above 0",
         },
         Parameter {
             name: "above_5_v",
@@ -130,7 +160,31 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
             bounds: [-3000.0, 3000.0],
             off: Some(0.0),
             default: Some(0.0),
-            about: "c at 5/5 of the range above 0",
+            about: "c at 5/8 of the range above 0",
+        },
+        Parameter {
+            name: "above_6_v",
+            unit: "V",
+            bounds: [-3000.0, 3000.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "c at 6/8 of the range above 0",
+        },
+        Parameter {
+            name: "above_7_v",
+            unit: "V",
+            bounds: [-3000.0, 3000.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "c at 7/8 of the range above 0",
+        },
+        Parameter {
+            name: "above_8_v",
+            unit: "V",
+            bounds: [-3000.0, 3000.0],
+            off: Some(0.0),
+            default: Some(0.0),
+            about: "c at 8/8 of the range above 0",
         },
     ],
     places: &[Place::VoltageCurve],
@@ -144,23 +198,35 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
                 ("below_3_v", 50.0),
                 ("below_4_v", 50.0),
                 ("below_5_v", 50.0),
+                ("below_6_v", 50.0),
+                ("below_7_v", 50.0),
+                ("below_8_v", 50.0),
                 ("above_1_v", 50.0),
                 ("above_2_v", 50.0),
                 ("above_3_v", 50.0),
                 ("above_4_v", 50.0),
                 ("above_5_v", 50.0),
+                ("above_6_v", 50.0),
+                ("above_7_v", 50.0),
+                ("above_8_v", 50.0),
             ],
             starts: &[
-                &[50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0],
-                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0],
+                &[50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0, 0.0],
+                &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 50.0],
             ],
             given: &[],
         }],
@@ -175,11 +241,14 @@ pub const FREE_VOLTAGE_CURVE: Effect = Effect {
     action: Action::Voltages(|p, _, _| Box::new(Bent(curve(p)))),
 };
 
-fn curve(p: &[f64]) -> Curve {
+/// Points on each side: close enough to show a limit's corner or a dead zone.
+const POINTS: usize = 8;
+
+fn curve(p: &[f64]) -> Curve<POINTS> {
     two_sided([-p[0], p[1]], &p[2..], 1.0)
 }
 
-struct Bent(Curve);
+struct Bent(Curve<POINTS>);
 
 impl SignalStage for Bent {
     fn settle(&mut self, volts: &mut [f64]) {

@@ -26,6 +26,7 @@ use crate::effects::{
     curve::{points, two_sided},
     fits,
 };
+use crate::model::CURVE_POINTS;
 
 /// See the file's head.
 pub const FREE_MOMENT_OF_DEVIATION: Effect = Effect {
@@ -169,7 +170,7 @@ pub const FREE_MOMENT_OF_DEVIATION: Effect = Effect {
         x_unit: "1/m",
         y: "additional moment",
         y_unit: "mN·m",
-        points: |p| points(&two_sided([-p[0], p[1]], &p[2..], 1.0)),
+        points: |p| points(&two_sided::<CURVE_POINTS>([-p[0], p[1]], &p[2..], 1.0)),
     }),
     action: Action::Robot(|p, robot| robot.extensions.moment_of_curvature = two_sided([-0.01 * p[0], 0.01 * p[1]], &p[2..], 1e4)),
 };

@@ -46,6 +46,7 @@ impl JointExtensions {
     pub(super) fn torque(&mut self, i: usize, joint: &PiezoJoint, angle: f64, rate: f64, voltage: &mut f64) -> f64 {
         *voltage *= self.gains[i];
         let joint = &PiezoJoint { stiffness: joint.stiffness * self.stiffness[i], ..*joint };
+        let seen = angle;
         let angle = angle - self.rest_angles[i];
         let delta = angle - joint.rest_angle_per_volt * *voltage;
         if self.extensions.softening < 0.0 {
@@ -56,7 +57,7 @@ impl JointExtensions {
         let stored: f64 = chain.iter().zip(&self.extensions.loss).map(|(q, share)| share * q).sum();
         let of = |(elastic, slip): (&f64, &Slip)| slip.moment * elastic / (slip.curvature * self.link);
         let slipping: f64 = slips.iter().zip(&self.extensions.slips).map(of).sum();
-        joint.torque(angle, rate, *voltage) + self.extensions.torque(joint.stiffness, self.link, delta, rate)
+        joint.torque(angle, rate, *voltage) + self.extensions.torque(joint.stiffness, self.link, [seen, delta], rate)
             - joint.stiffness * stored
             - slipping
     }

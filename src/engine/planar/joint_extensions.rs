@@ -36,6 +36,8 @@ pub(super) struct JointExtensions {
     root_rate: f64,
     /// Largest moment of friction and of the curve of the rate (dyn·cm).
     friction: f64,
+    /// Moment of dry friction in this step (dyn·cm).
+    dry: Vec<Lanes>,
     /// Per unit of the Prony chain: remainder after a step, gain per rate, and the means of both over the step.
     prony: [[f64; 4]; LOSS_TIMES.len()],
     half_step: f64,
@@ -82,6 +84,7 @@ impl JointExtensions {
             hardening,
             root_rate: 0.0,
             friction: extensions.dry_friction + extensions.moment_of_rate.largest(),
+            dry: vec![Lanes::splat(extensions.dry_friction); count],
             prony: prony(step),
             half_step: 0.5 * step,
             width,
@@ -99,26 +102,53 @@ impl JointExtensions {
             extensions: extensions.clone(),
             link,
         };
-        new.at_rest_slope = (0..count).map(|k| new.resisting_at(k, Lanes::ZERO)[1]).collect();
         new.resist();
         Some(Box::new(new))
     }
 
-    /// Sets the moments against the present rates.
+    /// Sets the moments against the present rates, and their derivatives at rest.
     fn resist(&mut self) {
-        if self.friction != 0.0 {
-            self.resisting = (0..self.rates.len()).map(|k| self.resisting_at(k, self.rates[k])).collect();
+        if self.friction == 0.0 {
+            return;
+        }
+        for k in 0..self.rates.len() {
+            self.resisting[k] = self.resisting_at(k, self.dry[k], self.rates[k]);
+            self.at_rest_slope[k] = self.resisting_at(k, self.dry[k], Lanes::ZERO)[1];
         }
     }
 
-    /// Moment against the rates (rad/s) of quad `k`'s joints, and its derivative.
+    /// Sets the moments of dry friction for a step, which depend on the angles in its middle by the last rates.
+    fn set_dry_friction(&mut self, quads: &[Quad]) {
+        let half = Lanes::splat(self.half_step);
+        let mut before = f64x2::ZERO;
+        let mut largest = 0.0_f64;
+        for (k, quad) in quads.iter().enumerate() {
+            let angle = quad.angle - quad.angle.inner(before);
+            before = quad.angle.level(1);
+            self.dry[k] = self.dry_moment(k, quad, angle + half * self.rates[k]);
+            largest = self.dry[k].to_array().into_iter().fold(largest, f64::max);
+        }
+        self.friction = largest + self.extensions.moment_of_rate.largest();
+        self.resist();
+    }
+
+    /// Moment of dry friction (dyn·cm) at the angles of quad `k`'s joints.
+    fn dry_moment(&self, k: usize, quad: &Quad, angle: Lanes) -> Lanes {
+        if !self.extensions.has_friction_of_bending() {
+            return Lanes::splat(self.extensions.dry_friction);
+        }
+        let of = |lane: usize| [self.extensions.dry_moment(quad.stiffness.lane(lane), self.link, angle.lane(lane)), 0.0];
+        self.of_joints(k, of)[0]
+    }
+
+    /// Moment against the rates (rad/s) of quad `k`'s joints, and its derivative, for moments of dry friction `dry`.
     #[inline(always)]
-    fn resisting_at(&self, k: usize, rate: Lanes) -> [Lanes; 2] {
+    fn resisting_at(&self, k: usize, dry: Lanes, rate: Lanes) -> [Lanes; 2] {
         // As `Extensions::friction`.
-        let Extensions { dry_friction, moment_of_rate, .. } = &self.extensions;
-        let share = if *dry_friction == 0.0 { Lanes::ZERO } else { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() };
-        let moment = Lanes::splat(*dry_friction) * share;
-        let slope = Lanes::splat(dry_friction / DRY_FRICTION_RATE) * (Lanes::splat(1.0) - share * share);
+        let moment_of_rate = &self.extensions.moment_of_rate;
+        let share = if self.is_repeated() { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() } else { Lanes::ZERO };
+        let moment = dry * share;
+        let slope = Lanes::splat(1.0 / DRY_FRICTION_RATE) * dry * (Lanes::splat(1.0) - share * share);
         if moment_of_rate.is_zero() {
             return [moment, slope].map(|of| self.joint[k] * of);
         }
@@ -138,7 +168,7 @@ impl JointExtensions {
     }
 
     pub(super) fn is_repeated(&self) -> bool {
-        self.extensions.dry_friction != 0.0
+        self.extensions.has_dry_friction()
     }
 
     /// Whether the torque depends on the elastic deviation alone.
@@ -210,7 +240,7 @@ impl JointExtensions {
 
     /// Extra torques (dyn·cm) at elastic angle (rad) and rate (rad/s), for records, in the same sense.
     pub(super) fn now(&self, k: usize, quad: &Quad, delta: Lanes, rate: Lanes) -> Lanes {
-        let [friction, _] = self.resisting_at(k, rate);
+        let [friction, _] = self.resisting_at(k, self.dry_moment(k, quad, delta + quad.rest_angle), rate);
         let stored = self.memory[k].iter().zip(&self.extensions.loss);
         let stored = stored.fold(Lanes::ZERO, |sum, (q, share)| sum + Lanes::splat(*share) * *q);
         let slips = self.slips_of(k).fold(Lanes::ZERO, |sum, (elastic, [per_angle, _])| sum + Lanes::splat(per_angle) * *elastic);
@@ -235,6 +265,9 @@ impl JointExtensions {
         }
         self.turned.fill(Lanes::ZERO);
         self.repetitions = 0;
+        if self.extensions.has_friction_of_bending() {
+            self.set_dry_friction(quads);
+        }
     }
 
     /// Slope s and constant part e* + s u* of friction about the last rates of quad `k`'s joints.
@@ -313,7 +346,7 @@ impl JointExtensions {
             before = quad.mean[0].level(1);
             if self.friction != 0.0 {
                 let [slope, rest] = self.friction_put[k];
-                let resisting = self.resisting_at(k, rate);
+                let resisting = self.resisting_at(k, self.dry[k], rate);
                 let missed = (slope * rate - rest - resisting[0]).abs();
                 changed = missed.to_array().into_iter().fold(changed, f64::max);
                 self.turned[k] = Lanes::splat(1.0).where_positive(-(rate * self.rates[k]), Lanes::ZERO);

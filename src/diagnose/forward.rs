@@ -1,0 +1,251 @@
+//! Forward selection: causes are added while they are worth it.
+
+use super::DiagnoseError;
+use super::fit::{Convergence, State, sum_of_squares};
+use super::plant::{Model, Term};
+use super::search::{LEAST_BIC, LEAST_GAIN, Scored, Screened, Search, Trial};
+use super::split::Split;
+
+/// Candidates that are fitted after screening, named ones and free forms.
+const FINALISTS: usize = 7;
+const FREE_FINALISTS: usize = 3;
+/// Candidates are fitted whose linear estimate is at least this share of the best one's, and free forms among free forms.
+const PROMISING: f64 = 0.02;
+const PROMISING_FREE: f64 = 0.4;
+/// Both a free form and a name are gone on from if the name takes more than this share of what the free form takes.
+const NEAR: f64 = 0.8;
+/// Most causes in addition to the constants.
+const MOST_CAUSES: usize = 6;
+
+impl Search<'_> {
+    /// Forward selection: adds causes while they are worth it. Returns the last model and the first round's trials.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if a model cannot be simulated.
+    pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
+        let mut first = None;
+        let best = self.further(from, MOST_CAUSES, None, &mut first)?;
+        Ok((best, first.unwrap_or_default()))
+    }
+
+    /// Adds up to `most` causes; notes the first round's trials. A free form may be `barred`, by its candidate: then there is no further fork.
+    fn further(
+        &mut self,
+        from: Scored,
+        most: usize,
+        barred: Option<usize>,
+        first: &mut Option<Vec<Trial>>,
+    ) -> Result<Scored, DiagnoseError> {
+        let mut best = from;
+        for left in (0..most).rev() {
+            if !self.is_sought(&best) {
+                break;
+            }
+            let (trials, screened) = self.trials(&best, barred)?;
+            let (top, name) = self.top(&trials);
+            let worthy = match top.filter(|top| self.is_worth(top, &best)) {
+                Some(top) => Some(top),
+                None => self.seen_by_fit_runs(&mut best, &trials).or_else(|| self.both(&screened, &best)),
+            };
+            first.get_or_insert(trials);
+            let Some(worthy) = worthy else { break };
+            (self.progress)(&self.adopting(&worthy, &best));
+            let name = name.filter(|name| barred.is_none() && self.is_near(name, &worthy, &best));
+            let before = (self.estimator.state(), self.split.clone());
+            let Some(settled) = self.settled(worthy) else { break };
+            best = settled;
+            if self.is_given_up(&best) {
+                break;
+            }
+            if let Some(name) = name.filter(|_| left > 0 && self.is_sought(&best)) {
+                return self.fork(best, name, before, left);
+            }
+        }
+        Ok(best)
+    }
+
+    /// The trial to adopt, and, if that is a free form, the best name. A free form where it is closer than the best name, so that what the name leaves goes
+    /// to no other cause.
+    fn top(&self, trials: &[Trial]) -> (Option<Scored>, Option<Scored>) {
+        let of = |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
+        match (of(false).cloned(), of(true).cloned()) {
+            (Some(named), Some(free)) if self.is_closer(&free, &named) => {
+                let last = named.model().terms.len() - 1;
+                let named = self.with_its_law(named, last);
+                if self.is_closer(&free, &named) { (Some(free), Some(named)) } else { (Some(named), None) }
+            }
+            (named, free) => (named.or(free), None),
+        }
+    }
+
+    /// A model with all that suits it better: nuisances, discretisation and laws, before another cause could take their errors. None if some run cannot be
+    /// simulated with it: then it is no model, and everything is as before.
+    fn settled(&mut self, model: Scored) -> Option<Scored> {
+        let before = self.estimator.state();
+        let Ok(settled) = self.settle(model) else {
+            self.estimator.restore(before);
+            return None;
+        };
+        let mut best = self.resolve(settled, Convergence::Rank);
+        for index in 0..best.model().terms.len() {
+            best = self.with_its_law(best, index);
+        }
+        Some(best)
+    }
+
+    /// True if a name takes nearly what a free form takes beyond `base`.
+    fn is_near(&self, name: &Scored, free: &Scored, base: &Scored) -> bool {
+        self.ends_free(free.model()) && base.total() - name.total() > NEAR * (base.total() - free.total())
+    }
+
+    /// Goes on from a model with a free form, and from the one with the best name in its stead, with up to `most` causes more: a free form may take what belongs
+    /// to further causes, or leave what the name would not. The name counts if it costs less in the end, or hardly more, with no more causes.
+    fn fork(&mut self, free: Scored, name: Scored, before: (State, Split), most: usize) -> Result<Scored, DiagnoseError> {
+        let barred = free.model().terms.last().map(|term| term.candidate);
+        let last = self.further(free, most, barred, &mut Some(Vec::new()))?;
+        let after = (self.estimator.state(), self.split.clone());
+        self.estimator.restore(before.0);
+        self.split = before.1;
+        (self.progress)("the best name in the stead of the free form");
+        let named = match self.settled(name) {
+            Some(name) => self.further(name, most, barred, &mut Some(Vec::new())).ok(),
+            None => None,
+        };
+        let most = self.cost(&last) + LEAST_GAIN * self.estimator.count(&self.split.all()) as f64;
+        let is_as_good = |named: &Scored| self.cost(named) <= most && self.causes(named) <= self.causes(&last);
+        if let Some(named) = named.filter(is_as_good) {
+            return Ok(named);
+        }
+        self.estimator.restore(after.0);
+        self.split = after.1;
+        Ok(last)
+    }
+
+    /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
+    fn with_its_law(&self, scored: Scored, index: usize) -> Scored {
+        let term = &scored.model().terms[index];
+        let own = self.candidate(term);
+        if own.is_variant {
+            return self.with_its_plain_law(scored, index);
+        }
+        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
+        let mut best: Option<Scored> = None;
+        for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
+            if variant.id != own.id || !variant.is_variant {
+                continue;
+            }
+            let mut tried: Vec<Vec<f64>> = Vec::new();
+            for start in &variant.starts {
+                // What both laws have in common stays as it is.
+                let x: Vec<f64> = start.iter().zip(&variant.parameters).map(|(x, p)| value(p.name).unwrap_or(*x)).collect();
+                if tried.contains(&x) {
+                    continue;
+                }
+                (self.progress)(&format!("another law of {}", own.id));
+                let mut model = scored.model().clone();
+                model.terms[index] = Term { candidate, x: x.clone() };
+                tried.push(x);
+                let Ok(other) = self.ranked(&model) else { continue };
+                if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
+                    best = Some(other);
+                }
+            }
+        }
+        // A law that cannot be fitted to the end is none.
+        let best = best.and_then(|best| self.fitted(best.model()).ok());
+        best.filter(|best| self.is_significant(best, &scored)).unwrap_or(scored)
+    }
+
+    /// The best screened candidates, without a barred one, fitted on top of `from`, best on select runs first, and the screening.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
+    fn trials(&self, from: &Scored, barred: Option<usize>) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
+        (self.progress)("screening all candidates");
+        let responses = self.responses(from.model(), |candidate, _| Some(candidate) != barred)?;
+        let screened = self.screened(from, &responses, None);
+        let is_basic = |(_, model): &&(f64, Model)| model.terms.last().is_none_or(|term| !self.candidate(term).is_variant);
+        let (free, named): (Vec<_>, Vec<_>) =
+            screened.ranked.iter().filter(is_basic).partition(|(_, model)| self.ends_free(model));
+        let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let most_free = free.first().map_or(0.0, |(gain, _)| *gain);
+        let mut finalists = self.finalists(named.into_iter().filter(|(gain, _)| *gain >= PROMISING * most), FINALISTS);
+        finalists
+            .extend(self.finalists(free.into_iter().filter(|(gain, _)| *gain >= PROMISING_FREE * most_free), FREE_FINALISTS));
+        let mut trials = Vec::new();
+        for model in finalists {
+            let Some(term) = model.terms.last() else { continue };
+            (self.progress)(&format!("fitting {}", self.id(term.candidate)));
+            // A candidate that cannot be fitted is dropped.
+            if let Ok(scored) = self.ranked_beyond(&model, &screened) {
+                trials.push(Trial { candidate: term.candidate, scored });
+            }
+        }
+        // Possible winners are refitted: an unconverged fit may do better on select runs than a converged one.
+        let best = |by: &dyn Fn(&Scored) -> f64, free: bool| {
+            let of_kind = (0..trials.len()).filter(|k| self.ends_free(trials[*k].scored.model()) == free);
+            of_kind.min_by(|a, b| by(&trials[*a].scored).total_cmp(&by(&trials[*b].scored)))
+        };
+        let judged = |scored: &Scored| self.judged(scored);
+        let mut ahead = vec![best(&judged, false), best(&|scored| scored.total(), false)];
+        // A free form that is no better than a name loses anyway.
+        let is_ahead = |free: &usize| ahead[0].is_none_or(|named| judged(&trials[*free].scored) < judged(&trials[named].scored));
+        ahead.push(best(&judged, true).filter(is_ahead));
+        ahead.dedup();
+        for index in ahead.into_iter().flatten() {
+            let model = trials[index].scored.model().clone();
+            if let Ok(scored) = self.fitted(&model) {
+                trials[index].scored = scored;
+            }
+        }
+        trials.sort_by(|a, b| self.judged(&a.scored).total_cmp(&self.judged(&b.scored)));
+        Ok((trials, screened))
+    }
+
+    /// True if a free form is better than a name on the select runs and by BIC.
+    fn is_closer(&self, free: &Scored, named: &Scored) -> bool {
+        self.judged(free) < self.judged(named) && free.bic() < named.bic() - LEAST_BIC
+    }
+
+    /// The adoption of a model's last term, in words.
+    fn adopting(&self, worthy: &Scored, best: &Scored) -> String {
+        let (after, runs) = self.chi2_to_judge_by(worthy);
+        let count = self.estimator.count(runs).max(1) as f64;
+        let name = worthy.model().terms.last().map_or("nothing", |term| self.id(term.candidate));
+        format!("adopting {name}: χ² per value from {:.2} to {:.2}", self.chi2_to_judge_by(best).0 / count, after / count)
+    }
+
+    /// A pair of causes of which neither is worth it alone; none if it cannot be fitted.
+    fn both(&self, screened: &Screened, base: &Scored) -> Option<Scored> {
+        // Other pairs are found one cause at a time.
+        let least = 2.0 * screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
+        let (_, pair) = self.sets(base.model(), screened, 2, |_| true).into_iter().find(|(gain, _)| *gain > least)?;
+        if let [.., first, second] = &pair.terms[..] {
+            (self.progress)(&format!("fitting {} and {} together", self.id(first.candidate), self.id(second.candidate)));
+        }
+        let both = self.ranked_beyond(&pair, screened).ok().filter(|both| self.is_worth(both, base))?;
+        self.fitted(both.model()).ok()
+    }
+
+    /// A cause that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
+    /// too. Keeps the new split if it does.
+    fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
+        let trial = trials.iter().min_by(|a, b| a.scored.bic().total_cmp(&b.scored.bic()))?;
+        let gain = |run: &usize| sum_of_squares(&base.residuals[*run]) - sum_of_squares(&trial.scored.residuals[*run]);
+        let most = self.split.fit.iter().copied().max_by(|a, b| gain(a).total_cmp(&gain(b)));
+        let run = most.filter(|_| self.split.fit.len() > 2 && self.is_seen_by_fit(&trial.scored, base))?;
+        (self.progress)(&format!("{} on another split", self.id(trial.candidate)));
+        let before = self.split.clone();
+        self.split.fit.retain(|other| *other != run);
+        self.split.select.push(run);
+        self.split.select.sort_unstable();
+        if let (Ok(plain), Ok(with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
+            && self.is_worth(&with, &plain)
+        {
+            *base = plain;
+            return Some(with);
+        }
+        self.split = before;
+        None
+    }
+}
