@@ -318,7 +318,8 @@ fn a_structural_loss_damps_the_same_at_any_frequency() {
 
 #[test]
 fn a_loss_in_proportion_to_the_bending_is_a_loss_factor_at_any_frequency_and_amplitude() {
-    // A cycle of amplitude A takes 2·(π/2)·η·k·A² = 2π·η·(k·A²/2) of a joint: the response lags by η well below resonance, where friction turns fast.
+    // The drive is one-sided: a joint goes from 0 to A and back. With the moment (π/2)·η·k·|θ| a cycle takes (π/2)·η·k·A², which is π·k·(A/2)²·sin φ of
+    // a response that lags by φ: φ = 2η well below resonance, at rates at which friction turns fast.
     for (frequency, volts) in [(1.0, -1000.0), (3.0, -1000.0), (3.0, -400.0)] {
         let settings = [
             format!("drive.frequency_hz={frequency}"),
@@ -334,7 +335,7 @@ fn a_loss_in_proportion_to_the_bending_is_a_loss_factor_at_any_frequency_and_amp
             measures.tip_phase_deg.unwrap()
         };
         let phase = (lag(0.0) - lag(0.02)).to_radians();
-        assert!((phase / 0.02 - 1.0).abs() < 0.1, "{frequency} Hz, {volts} V: {phase}");
+        assert!((phase / 0.04 - 1.0).abs() < 0.1, "{frequency} Hz, {volts} V: {phase}");
     }
 }
 
@@ -508,7 +509,7 @@ fn free_forms_hold_the_named_laws_of_their_places() {
     let line: Vec<_> = (0..8).map(|k| (below[k], -100.0 * (k + 1) as f64 / 8.0)).chain(ends).collect();
     let soft = |c: f64| [1, 2, 3, 4].map(|k| (COMPLIANCES[k - 1], c));
     let [s1, s2, s3, s4] = soft(0.7);
-    let cases: [(Effects, Effects); 13] = [
+    let cases: [(Effects, Effects); 15] = [
         (
             &[(
                 "free-stiffness-along",

@@ -93,7 +93,7 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 30] = [
     ("cable-drag", &[("stiffness_n_per_m", 5.0), ("level_mm", 50.0), ("position_mm", 60.0), ("drag_mn", 2.0)]),
     ("cable-drag", &[("stiffness_n_per_m", 5.0), ("level_mm", -50.0), ("below", 0.0), ("position_mm", 60.0)]),
     ("cable-drag", &[("stiffness_n_per_m", 500.0), ("level_mm", 1.0), ("position_mm", 4.0)]),
-    ("structural-damping", &[("bending_loss_factor", 0.02)]),
+    ("structural-damping", &[("bending_loss_factor", 0.001)]),
     (
         "free-joint-friction",
         &[("bend_range_per_m", 4.0), ("moment_1_mn_m", 0.02), ("moment_3_mn_m", 0.1), ("moment_6_mn_m", 0.05)],
