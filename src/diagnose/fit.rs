@@ -509,7 +509,7 @@ impl<'a> Estimator<'a> {
     }
 
     /// Variance inflation of each coordinate over that of independent noise, by the sandwich estimator: C Σ (J_bᵀ r_b)(J_bᵀ r_b)ᵀ C against
-    /// C = (JᵀJ)⁻¹, summed over blocks b within which residuals may be correlated. Blocks are those of [`blocks`], or whole runs (times R/(R − 1) for R
+    /// C = (JᵀJ)⁻¹, summed over blocks b within which residuals may be correlated. Blocks are those of `blocks.rs`, or whole runs (times R/(R − 1) for R
     /// runs); the larger ratio counts, and it is at least 1 and at least χ² per value. What exceeds 1 is known from R runs only: it is multiplied by
     /// (t/1.96)² with the 95 % quantile t of Student's distribution of R − 1 degrees of freedom, 1 at least.
     ///

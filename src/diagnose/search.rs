@@ -1,4 +1,4 @@
-//! Selection of causes: screening, backward elimination and replacement. Forward selection is in [`forward`](super::forward).
+//! Selection of causes: screening, backward elimination and replacement. Forward selection is in `forward.rs`.
 //!
 //! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
