@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use generator::{Case, DRIFTING_GAIN, INSIDE, OUTSIDE, cases};
-use judge::{alike, diagnosed, is_right, physics, range};
+use judge::{diagnosed, is_right, physics, range};
 use sfers::diagnose::diagnosis::{Adopted, Diagnosis, Verdict};
 
 fn numbers<T: std::str::FromStr + Clone>(argument: Option<&String>, default: &[T]) -> Vec<T> {
@@ -174,10 +174,9 @@ fn main() {
     }
 }
 
-/// True if an adopted cause is the one with an id, or tied with it, or one that motion alone cannot tell from it.
+/// True if an adopted cause is the one with an id, or tied with it.
 fn is_of(effect: &Adopted, id: &str) -> bool {
-    let alike = alike(id);
-    alike.contains(&effect.id.as_str()) || effect.tied_with.iter().any(|tied| tied.split('+').any(|tied| alike.contains(&tied)))
+    effect.id == id || effect.tied_with.iter().any(|tied| tied.split('+').any(|tied| tied == id))
 }
 
 /// True if there are causes, and all of them are named, minor ones included.

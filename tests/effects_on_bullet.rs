@@ -93,6 +93,7 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 30] = [
     ("cable-drag", &[("stiffness_n_per_m", 5.0), ("level_mm", 50.0), ("position_mm", 60.0), ("drag_mn", 2.0)]),
     ("cable-drag", &[("stiffness_n_per_m", 5.0), ("level_mm", -50.0), ("below", 0.0), ("position_mm", 60.0)]),
     ("cable-drag", &[("stiffness_n_per_m", 500.0), ("level_mm", 1.0), ("position_mm", 4.0)]),
+    // Little, so that Bullet's explicit steps follow the turn of friction within 0.03 rad/s: with 0.02 its error is not yet of first order at 2e-5 s.
     ("structural-damping", &[("bending_loss_factor", 0.001)]),
     (
         "free-joint-friction",

@@ -23,20 +23,13 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if a model cannot be simulated.
     pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
-        let mut first = None;
-        let best = self.further(from, MOST_CAUSES, None, &mut first)?;
-        Ok((best, first.unwrap_or_default()))
+        self.further(from, MOST_CAUSES, None)
     }
 
-    /// Adds up to `most` causes; notes the first round's trials. A free form may be `barred`, by its candidate: then there is no further fork.
-    fn further(
-        &mut self,
-        from: Scored,
-        most: usize,
-        barred: Option<usize>,
-        first: &mut Option<Vec<Trial>>,
-    ) -> Result<Scored, DiagnoseError> {
+    /// Adds up to `most` causes. A free form may be `barred`, by its candidate: then there is no further fork.
+    fn further(&mut self, from: Scored, most: usize, barred: Option<usize>) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
         let mut best = from;
+        let mut first: Option<Vec<Trial>> = None;
         for left in (0..most).rev() {
             if !self.is_sought(&best) {
                 break;
@@ -58,10 +51,11 @@ impl Search<'_> {
                 break;
             }
             if let Some(name) = name.filter(|_| left > 0 && self.is_sought(&best)) {
-                return self.fork(best, name, before, left);
+                best = self.fork(best, name, before, left)?;
+                break;
             }
         }
-        Ok(best)
+        Ok((best, first.unwrap_or_default()))
     }
 
     /// The trial to adopt, and, if that is a free form, the best name. A free form where it is closer than the best name, so that what the name leaves goes
@@ -102,18 +96,15 @@ impl Search<'_> {
     /// to further causes, or leave what the name would not. The name counts if it costs less in the end, or hardly more, with no more causes.
     fn fork(&mut self, free: Scored, name: Scored, before: (State, Split), most: usize) -> Result<Scored, DiagnoseError> {
         let barred = free.model().terms.last().map(|term| term.candidate);
-        let last = self.further(free, most, barred, &mut Some(Vec::new()))?;
+        let (last, _) = self.further(free, most, barred)?;
         let after = (self.estimator.state(), self.split.clone());
         self.estimator.restore(before.0);
         self.split = before.1;
         (self.progress)("the best name in the stead of the free form");
-        let named = match self.settled(name) {
-            Some(name) => self.further(name, most, barred, &mut Some(Vec::new())).ok(),
-            None => None,
-        };
+        let named = self.settled(name).and_then(|name| self.further(name, most, barred).ok());
         let most = self.cost(&last) + LEAST_GAIN * self.estimator.count(&self.split.all()) as f64;
         let is_as_good = |named: &Scored| self.cost(named) <= most && self.causes(named) <= self.causes(&last);
-        if let Some(named) = named.filter(is_as_good) {
+        if let Some(named) = named.map(|(named, _)| named).filter(is_as_good) {
             return Ok(named);
         }
         self.estimator.restore(after.0);
@@ -227,7 +218,7 @@ impl Search<'_> {
         self.fitted(both.model()).ok()
     }
 
-    /// A cause that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
+    /// A cause, or a free form, that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
     /// too. Keeps the new split if it does.
     fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
         let trial = trials.iter().min_by(|a, b| a.scored.bic().total_cmp(&b.scored.bic()))?;

@@ -28,11 +28,6 @@ pub fn diagnosed(folder: &Path) -> Outcome {
 /// Causes that motion alone cannot tell apart (docs/validation.md): one name of a line stands for all.
 const INSEPARABLE: [&[&str]; 2] = [&["stiffness", "areal-mass"], &["time-delay", "sensor-delay"]];
 
-/// An id and those that motion alone cannot tell from it.
-pub fn alike(id: &str) -> Vec<&str> {
-    INSEPARABLE.iter().find(|set| set.contains(&id)).map_or(vec![id], |set| set.to_vec())
-}
-
 /// Causes beside the discretisation, without minor ones.
 pub fn physics(d: &Diagnosis) -> Vec<&Adopted> {
     d.effects.iter().filter(|effect| effect.id != "discretisation" && effect.role == Part::Cause).collect()
@@ -46,8 +41,8 @@ pub fn names(d: &Diagnosis) -> Vec<&str> {
 /// True if the hidden cause is named, alone, or tied within what cannot be told apart.
 pub fn is_right(d: &Diagnosis, hidden: &str) -> bool {
     let [effect] = physics(d)[..] else { return false };
-    let alike = alike(hidden);
-    let allowed = |id: &str| alike.contains(&id);
+    let set = INSEPARABLE.iter().find(|set| set.contains(&hidden)).copied().unwrap_or_default();
+    let allowed = |id: &str| id == hidden || set.contains(&id);
     let is_nearest = effect.nearest.first().is_some_and(|near| allowed(&near.id));
     if d.verdict == Verdict::Located {
         return is_nearest;
