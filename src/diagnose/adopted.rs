@@ -68,8 +68,13 @@ fn weighed(
     let without_it = search.screened(&without, responses, Some(index));
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
     let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with).unzip();
-    let (shared, both) = if set.is_none() { shared(search, best, (screened, responses), index).unzip() } else { (None, None) };
+    let (shared, both) = shared(search, best, (screened, responses), index).unzip();
+    if standing.stability.is_some_and(|share| share < LEAST_STABILITY) {
+        tied_with.extend(standing.instead.iter().map(|id| (*id).to_owned()));
+    }
     tied_with.extend(set.into_iter().chain(shared));
+    tied_with.sort_unstable();
+    tied_with.dedup();
     let pair = pair.or(both);
     Ok(Weighed { without, standing, tied_with, pair })
 }
@@ -126,6 +131,13 @@ pub(super) fn adopted(
             causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));
         effect.nearest = of_place.map(|(_, tried)| tried.clone()).unwrap_or_default();
         effects.push(effect);
+    }
+    let first = effects.len() - terms.len();
+    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < MINOR_MISFIT;
+    let small: Vec<usize> = (0..terms.len()).filter(is_small).collect();
+    for (index, own) in needed_together(search, best, &whole, small) {
+        taken[first + index] = own;
+        effects[first + index].share = whole.share(own, search.candidate(&terms[index]).is_constant);
     }
     set_roles(&mut effects, &taken);
     let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
@@ -186,6 +198,35 @@ impl Whole {
     }
 }
 
+/// Those of the `small` terms without which much comes back once the others are left out, and how much (χ² per value): causes that can each do another one's work, as a
+/// stiffness a tip mass's, are not minor together. The least needed are left out first.
+fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec<usize>) -> Vec<(usize, f64)> {
+    let candidate_of = |index: &usize| best.model().terms[*index].candidate;
+    let count = search.estimator.count(&search.split.all()) as f64;
+    let (mut needed, mut rest) = (Vec::new(), best.clone());
+    // One alone is as small as it is.
+    if small.len() == 1 {
+        return needed;
+    }
+    while !small.is_empty() {
+        let without = |index: &usize| {
+            let at = rest.model().terms.iter().position(|term| term.candidate == candidate_of(index))?;
+            // A model that cannot be simulated leaves the roles as they are.
+            search.ranked_at_its_spread(&search.without(&rest, at).ok()?).ok()
+        };
+        let shorter = small.iter().enumerate().filter_map(|(at, index)| Some((at, without(index)?)));
+        let Some((at, least)) = shorter.min_by(|a, b| a.1.total().total_cmp(&b.1.total())) else { break };
+        let index = small.remove(at);
+        let own = (search.chi2(&least) - search.chi2(&rest)).max(0.0) / count;
+        if own >= MINOR_MISFIT && whole.share(own, search.candidate(&best.model().terms[index]).is_constant) > MINOR_SHARE {
+            needed.push((index, own));
+        } else {
+            rest = least;
+        }
+    }
+    needed
+}
+
 /// Sets the roles of causes, from their shares and what each removes (χ² per value).
 fn set_roles(effects: &mut [Adopted], taken: &[f64]) {
     let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
@@ -243,6 +284,7 @@ fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::waves::{Waves, search};
 
     fn cause(id: &str, share: f64, stability: Option<f64>, tied_with: &[&str]) -> Adopted {
         Adopted {
@@ -280,5 +322,21 @@ mod tests {
         let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
         set_roles(&mut within_the_noise, &[0.2]);
         assert_eq!(within_the_noise[0].role, Minor);
+    }
+
+    #[test]
+    fn causes_that_do_each_others_work_are_not_minor_together() {
+        for (amplitude, needed) in [(5.0, 1), (0.0, 0)] {
+            let plant = Waves::new(&[("first", amplitude)]);
+            let search = search(&plant);
+            let bare = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+            let both = [1, 2].map(|candidate| Term { candidate, x: vec![1.0] });
+            let best = search.fitted(&Model::new(both.to_vec(), 1.0, false)).unwrap();
+            let whole = Whole::of(&search, &best, &bare).unwrap();
+            let found = needed_together(&search, &best, &whole, vec![0, 1]);
+            assert_eq!(found.len(), needed, "{found:?}");
+            // The mean square of the wave.
+            assert!(found.iter().all(|(_, own)| (own / 12.5 - 1.0).abs() < 0.1), "{found:?}");
+        }
     }
 }

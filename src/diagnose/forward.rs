@@ -1,10 +1,9 @@
 //! Forward selection: causes are added while they are worth it.
 
 use super::DiagnoseError;
-use super::fit::{Convergence, State, sum_of_squares};
+use super::fit::{Convergence, sum_of_squares};
 use super::plant::{Model, Term};
-use super::search::{LEAST_BIC, LEAST_GAIN, Scored, Screened, Search, Trial};
-use super::split::Split;
+use super::search::{LEAST_BIC, Scored, Screened, Search, Trial};
 
 /// Candidates that are fitted after screening, named ones and free forms.
 const FINALISTS: usize = 7;
@@ -12,8 +11,6 @@ const FREE_FINALISTS: usize = 3;
 /// Candidates are fitted whose linear estimate is at least this share of the best one's, and free forms among free forms.
 const PROMISING: f64 = 0.02;
 const PROMISING_FREE: f64 = 0.4;
-/// Both a free form and a name are gone on from if the name takes more than this share of what the free form takes.
-const NEAR: f64 = 0.8;
 /// Most causes in addition to the constants.
 const MOST_CAUSES: usize = 6;
 
@@ -23,57 +20,45 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if a model cannot be simulated.
     pub fn forward(&mut self, from: Scored) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
-        self.further(from, MOST_CAUSES, None)
-    }
-
-    /// Adds up to `most` causes. A free form may be `barred`, by its candidate: then there is no further fork.
-    fn further(&mut self, from: Scored, most: usize, barred: Option<usize>) -> Result<(Scored, Vec<Trial>), DiagnoseError> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
-        for left in (0..most).rev() {
+        for _ in 0..MOST_CAUSES {
             if !self.is_sought(&best) {
                 break;
             }
-            let (trials, screened) = self.trials(&best, barred)?;
-            let (top, name) = self.top(&trials);
-            let worthy = match top.filter(|top| self.is_worth(top, &best)) {
+            let (trials, screened) = self.trials(&best)?;
+            let worthy = match self.top(&trials).filter(|top| self.is_worth(top, &best)) {
                 Some(top) => Some(top),
                 None => self.seen_by_fit_runs(&mut best, &trials).or_else(|| self.both(&screened, &best)),
             };
             first.get_or_insert(trials);
             let Some(worthy) = worthy else { break };
             (self.progress)(&self.adopting(&worthy, &best));
-            let name = name.filter(|name| barred.is_none() && self.is_near(name, &worthy, &best));
-            let before = (self.estimator.state(), self.split.clone());
             let Some(settled) = self.settled(worthy) else { break };
             best = settled;
             if self.is_given_up(&best) {
-                break;
-            }
-            if let Some(name) = name.filter(|_| left > 0 && self.is_sought(&best)) {
-                best = self.fork(best, name, before, left)?;
                 break;
             }
         }
         Ok((best, first.unwrap_or_default()))
     }
 
-    /// The trial to adopt, and, if that is a free form, the best name. A free form where it is closer than the best name, so that what the name leaves goes
-    /// to no other cause.
-    fn top(&self, trials: &[Trial]) -> (Option<Scored>, Option<Scored>) {
+    /// The trial to adopt: a free form where it is closer than the best name, so that what the name leaves goes to no other cause.
+    fn top(&self, trials: &[Trial]) -> Option<Scored> {
         let of = |free: bool| trials.iter().map(|trial| &trial.scored).find(|scored| self.ends_free(scored.model()) == free);
         match (of(false).cloned(), of(true).cloned()) {
             (Some(named), Some(free)) if self.is_closer(&free, &named) => {
                 let last = named.model().terms.len() - 1;
                 let named = self.with_its_law(named, last);
-                if self.is_closer(&free, &named) { (Some(free), Some(named)) } else { (Some(named), None) }
+                Some(if self.is_closer(&free, &named) { free } else { named })
             }
-            (named, free) => (named.or(free), None),
+            (named, free) => named.or(free),
         }
     }
 
-    /// A model with all that suits it better: nuisances, discretisation and laws, before another cause could take their errors. None if some run cannot be
-    /// simulated with it: then it is no model, and everything is as before.
+    /// A model with all that suits it better: nuisances, discretisation and laws, before another cause could take their errors; another law of its last cause, and
+    /// the plain one of those before where the other one is no longer needed. None if some run cannot be simulated with it: then it is no model, and
+    /// everything is as before.
     fn settled(&mut self, model: Scored) -> Option<Scored> {
         let before = self.estimator.state();
         let Ok(settled) = self.settle(model) else {
@@ -81,35 +66,11 @@ impl Search<'_> {
             return None;
         };
         let mut best = self.resolve(settled, Convergence::Rank);
-        for index in 0..best.model().terms.len() {
-            best = self.with_its_law(best, index);
+        let last = best.model().terms.len().saturating_sub(1);
+        for index in 0..last {
+            best = self.with_its_plain_law(best, index);
         }
-        Some(best)
-    }
-
-    /// True if a name takes nearly what a free form takes beyond `base`.
-    fn is_near(&self, name: &Scored, free: &Scored, base: &Scored) -> bool {
-        self.ends_free(free.model()) && base.total() - name.total() > NEAR * (base.total() - free.total())
-    }
-
-    /// Goes on from a model with a free form, and from the one with the best name in its stead, with up to `most` causes more: a free form may take what belongs
-    /// to further causes, or leave what the name would not. The name counts if it costs less in the end, or hardly more, with no more causes.
-    fn fork(&mut self, free: Scored, name: Scored, before: (State, Split), most: usize) -> Result<Scored, DiagnoseError> {
-        let barred = free.model().terms.last().map(|term| term.candidate);
-        let (last, _) = self.further(free, most, barred)?;
-        let after = (self.estimator.state(), self.split.clone());
-        self.estimator.restore(before.0);
-        self.split = before.1;
-        (self.progress)("the best name in the stead of the free form");
-        let named = self.settled(name).and_then(|name| self.further(name, most, barred).ok());
-        let most = self.cost(&last) + LEAST_GAIN * self.estimator.count(&self.split.all()) as f64;
-        let is_as_good = |named: &Scored| self.cost(named) <= most && self.causes(named) <= self.causes(&last);
-        if let Some(named) = named.map(|(named, _)| named).filter(is_as_good) {
-            return Ok(named);
-        }
-        self.estimator.restore(after.0);
-        self.split = after.1;
-        Ok(last)
+        Some(if best.model().terms.is_empty() { best } else { self.with_its_law(best, last) })
     }
 
     /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
@@ -142,19 +103,18 @@ impl Search<'_> {
                 }
             }
         }
-        // A law that cannot be fitted to the end is none.
-        let best = best.and_then(|best| self.fitted(best.model()).ok());
+        // One that is no better so far is not fitted to the end, and one that cannot be is none.
+        let best = best.filter(|best| best.total() < scored.total()).and_then(|best| self.fitted(best.model()).ok());
         best.filter(|best| self.is_significant(best, &scored)).unwrap_or(scored)
     }
 
-    /// The best screened candidates, without a barred one, fitted on top of `from`, best on select runs first, and the screening.
+    /// The best screened candidates fitted on top of `from`, best on select runs first, and the screening.
     ///
     /// # Errors
     /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
-    fn trials(&self, from: &Scored, barred: Option<usize>) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
+    fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
-        let responses = self.responses(from.model(), |candidate, _| Some(candidate) != barred)?;
-        let screened = self.screened(from, &responses, None);
+        let screened = self.screen(from)?;
         let is_basic = |(_, model): &&(f64, Model)| model.terms.last().is_none_or(|term| !self.candidate(term).is_variant);
         let (free, named): (Vec<_>, Vec<_>) =
             screened.ranked.iter().filter(is_basic).partition(|(_, model)| self.ends_free(model));

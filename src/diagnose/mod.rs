@@ -62,5 +62,7 @@ mod unseen;
 mod verdict;
 mod visited;
 pub mod voltage;
+#[cfg(test)]
+mod waves;
 
 pub use error::DiagnoseError;

@@ -12,7 +12,7 @@ use super::plant::{Candidate, Model, Term};
 use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, VISIBLE};
 
 /// A name stands if it takes this share of what the free form takes on select runs.
-const LEAST_TAKEN: f64 = 0.95;
+pub(super) const LEAST_TAKEN: f64 = 0.95;
 /// Held-out runs show a place if the free form takes there this share of what it takes in all, both per value.
 const LEAST_SHOWN: f64 = 0.1;
 /// Named candidates of a place that are fitted in the stead of its free form.

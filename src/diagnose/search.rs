@@ -3,7 +3,7 @@
 //! Models are fitted to the fit runs and compared on the select runs. The constants of the nominal model are free from the beginning, so that a
 //! cause is credited only with what re-tuned constants cannot explain; the final elimination includes them.
 //!
-//! The file is long because screening, starts of fits, elimination and replacement share the state of one search; its last 140 lines are tests.
+//! The file is long because screening, starts of fits, elimination and replacement share the state of one search.
 
 use std::collections::BTreeMap;
 
@@ -54,6 +54,10 @@ const LEAST_SIGNIFICANT: usize = 3;
 const LEAST_RIDGE: f64 = 1e-6;
 /// Cosine of two changes of the residuals from which on they are nearly the same.
 const ALIKE: f64 = 0.9;
+/// Starts are moved nearer to where a cause has no effect if what is missing is less than this share of what they change, ...
+const ENOUGH: f64 = 0.5;
+/// ... unless they then change less than this share of what is missing, as a limit beyond the range does.
+const STILL_THERE: f64 = 0.3;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
 /// Most alternations between the spread of the bench's faults and the model.
@@ -526,16 +530,50 @@ impl Search<'_> {
         let used: Vec<&str> = about.terms.iter().map(|term| self.id(term.candidate)).collect();
         let candidates = self.estimator.plant.candidates().iter().enumerate();
         let wanted = candidates.filter(|(index, c)| is_wanted(*index, c) && !used.contains(&c.id));
-        let starts: Vec<Term> =
-            wanted.flat_map(|(candidate, c)| c.starts.iter().map(move |x| Term { candidate, x: x.clone() })).collect();
+        // Free forms are linear in their weights: each start is by itself.
+        let of_candidate = |(candidate, c): (usize, &Candidate)| -> Vec<Vec<Term>> {
+            let starts: Vec<Term> = c.starts.iter().map(|x| Term { candidate, x: x.clone() }).collect();
+            if c.is_free_form { starts.into_iter().map(|start| vec![start]).collect() } else { vec![starts] }
+        };
+        let groups: Vec<Vec<Term>> = wanted.flat_map(of_candidate).collect();
         let derivatives = self.estimator.derivatives(&about, &runs)?;
         let plain = DVector::from_vec(self.estimator.residuals_of(&about, &runs)?.concat());
-        let change = |term: Term| {
+        let change = |term: &Term| {
             let residuals = self.estimator.residuals_of(&with(&about, [term.clone()]), &runs).ok()?;
-            Some((term, DVector::from_vec(residuals.concat()) - &plain))
+            Some(DVector::from_vec(residuals.concat()) - &plain)
         };
-        let starts = starts.into_par_iter().filter_map(change).collect();
+        let starts = groups.into_par_iter().flat_map_iter(|starts| self.sized(&starts, plain.norm(), &change)).collect();
         Ok(Responses { about, derivatives, starts })
+    }
+
+    /// Starts of one law with the `change` of the residuals by each. One that changes them by far more than what is `missing` is moved nearer to where the cause has
+    /// no effect, until it changes them by about as much: what a cause does near a resonance is proportional to its parameters only as long as it is small.
+    fn sized(&self, starts: &[Term], missing: f64, change: &impl Fn(&Term) -> Option<DVector<f64>>) -> Changes {
+        let mut sized = Changes::new();
+        let mut far: Vec<&Term> = Vec::new();
+        for start in starts {
+            let own = self.candidate(start);
+            // One that is further out than another that was too far already.
+            if far.iter().any(|near| is_beyond(start, near, &own.parameters)) {
+                continue;
+            }
+            let Some(by) = change(start) else { continue };
+            let share = missing / by.norm();
+            if own.is_free_form || share > ENOUGH {
+                sized.push((start.clone(), by));
+                continue;
+            }
+            let nearer = |(x, free): (&f64, &Free)| free.off.map_or(*x, |off| off + share * (x - off));
+            let term = Term { candidate: start.candidate, x: start.x.iter().zip(&own.parameters).map(nearer).collect() };
+            match change(&term).filter(|less| less.norm() > STILL_THERE * missing) {
+                Some(less) => {
+                    far.push(start);
+                    sized.push((term, less));
+                }
+                None => sized.push((start.clone(), by)),
+            }
+        }
+        sized
     }
 
     /// Linear estimates of how far every start would lower χ² of `from`, beyond a refit of its own coordinates. `from` is the model of the responses, or
@@ -899,6 +937,22 @@ impl Search<'_> {
     }
 }
 
+/// True if a start lies on the line from where a law has no effect through another start, beyond that.
+fn is_beyond(start: &Term, near: &Term, parameters: &[Free]) -> bool {
+    let mut ratios = parameters.iter().zip(start.x.iter().zip(&near.x)).map(|(free, (x, near))| match free.off {
+        Some(off) => (x - off) / (near - off),
+        None => {
+            if x == near {
+                f64::INFINITY
+            } else {
+                0.0
+            }
+        }
+    });
+    let along = parameters.iter().position(|free| free.off.is_some()).and_then(|at| ratios.clone().nth(at)).unwrap_or(0.0);
+    along > 1.0 && ratios.all(|ratio| ratio == f64::INFINITY || (ratio / along - 1.0).abs() < 1e-9)
+}
+
 /// A model with more terms.
 fn with(base: &Model, terms: impl IntoIterator<Item = Term>) -> Model {
     let mut model = base.clone();
@@ -969,111 +1023,7 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::dataset::Role;
-    use crate::diagnose::plant::{Plant, Signal};
-    use crate::diagnose::split::split;
-
-    /// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
-    struct Waves {
-        signals: Vec<Signal>,
-        candidates: Vec<Candidate>,
-    }
-
-    const VALUES: usize = 400;
-
-    fn wave(id: &str, run: usize, at: usize) -> f64 {
-        let t = at as f64 / VALUES as f64 + 0.1 * run as f64;
-        match id {
-            "first" => (7.0 * t).sin(),
-            "second" => -(7.0 * t + 0.12).sin(),
-            _ => (23.0 * t).cos(),
-        }
-    }
-
-    impl Waves {
-        fn new(of: &[(&str, f64)]) -> Self {
-            let signal = |run: usize| {
-                let value = |at: usize| {
-                    let noise = (1.0 + (run * VALUES + at) as f64).sin() * 43_758.545_3;
-                    // Uniform noise of unit variance.
-                    let noise = (noise - noise.floor() - 0.5) * 12_f64.sqrt();
-                    of.iter().map(|(id, x)| x * wave(id, run, at)).sum::<f64>() + noise
-                };
-                Signal {
-                    id: format!("run {run}"),
-                    values: (0..VALUES).map(value).collect(),
-                    sigmas: vec![1.0; VALUES],
-                    times: (0..VALUES).map(|at| at as f64).collect(),
-                    channels: vec![0; VALUES],
-                    inputs: (0..VALUES).map(|at| (at as f64 * (1.0 + run as f64) / 50.0).sin()).collect(),
-                    ..Signal::default()
-                }
-            };
-            let candidate = |id: &'static str| Candidate {
-                id,
-                kind: "test",
-                cause: "A wave.",
-                places: vec!["test"],
-                is_free_form: false,
-                is_variant: false,
-                is_constant: false,
-                parameters: vec![Free {
-                    name: "x",
-                    unit: "",
-                    off: Some(0.0),
-                    bounds: [-100.0, 100.0],
-                    scale: 1.0,
-                    inverse: false,
-                }],
-                fixed: Vec::new(),
-                starts: vec![vec![1.0]],
-            };
-            let mut candidates = ["other", "first", "second"].map(candidate).to_vec();
-            // Another law of the second cause, with a part of the other one.
-            let mut variant = candidate("second");
-            variant.is_variant = true;
-            variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
-            variant.starts = vec![vec![1.0, 1.0]];
-            candidates.push(variant);
-            Self { signals: (0..6).map(signal).collect(), candidates }
-        }
-    }
-
-    impl Plant for Waves {
-        fn signals(&self) -> &[Signal] {
-            &self.signals
-        }
-
-        fn channels(&self) -> Vec<String> {
-            vec!["y".into()]
-        }
-
-        fn unit(&self) -> &'static str {
-            ""
-        }
-
-        fn candidates(&self) -> &[Candidate] {
-            &self.candidates
-        }
-
-        fn predict(
-            &self,
-            model: &Model,
-            run: usize,
-            _nuisance: &crate::diagnose::plant::Nuisance,
-        ) -> Result<Vec<f64>, DiagnoseError> {
-            let of = |term: &Term, at| {
-                let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
-                term.x[0] * wave(self.candidates[term.candidate].id, run, at) + more
-            };
-            Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
-        }
-    }
-
-    fn search(plant: &Waves) -> Search<'_> {
-        let split = split(plant, &[Role::Auto; 6]);
-        Search { estimator: Estimator::new(plant), split, unexplained: 0.0, limit: f64::INFINITY, progress: &|_: &str| {} }
-    }
+    use crate::diagnose::waves::{Waves, search};
 
     fn found(plant: &Waves) -> Vec<&'static str> {
         let mut search = search(plant);
@@ -1095,6 +1045,23 @@ mod tests {
         assert_eq!(found(&Waves::new(&[("other", 1.0)])), ["other"]);
         assert_eq!(found(&Waves::new(&[("first", 1.0)])), ["first"]);
         assert!(found(&Waves::new(&[])).is_empty());
+    }
+
+    #[test]
+    fn starts_are_as_large_as_what_is_missing() {
+        // What is missing is noise of one unit; a wave of amplitude 2.1 and more is twice as much.
+        let mut plant = Waves::new(&[]);
+        plant.candidates[0].starts = vec![vec![50.0], vec![100.0], vec![1.0], vec![-50.0]];
+        let search = search(&plant);
+        let responses = search.responses(&Model::new(Vec::new(), 1.0, false), |candidate, _| candidate == 0).unwrap();
+        let starts: Vec<f64> = responses.starts.iter().map(|(start, _)| start.x[0]).collect();
+        let [outer, given, other] = starts[..] else { panic!("{starts:?}") };
+        assert!((1.3..1.6).contains(&outer) && (outer + other).abs() < 1e-9 && given == 1.0, "{starts:?}");
+        // One that does nothing below 40 stays where it does something.
+        let sized = search.sized(&[Term { candidate: 0, x: vec![50.0] }], 1.0, &|term: &Term| {
+            Some(DVector::from_element(10, (term.x[0] - 40.0).max(0.0)))
+        });
+        assert_eq!(sized[0].0.x, [50.0]);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 
 use super::fit::sum_of_squares;
+use super::naming::LEAST_TAKEN;
 use super::plant::{Candidate, Model, Term};
 use super::projection::without_directions;
 use super::search::{LEAST_GAIN, Scored, Screened, Search, Trial, joined};
@@ -19,6 +20,8 @@ const LEFT_BY_CONSTANT: f64 = 0.02;
 pub(super) struct Standing {
     /// Share of resamples in which it is chosen; none with few runs.
     pub(super) stability: Option<f64>,
+    /// Causes that are chosen instead in some resamples, and take nearly as much of all runs.
+    pub(super) instead: Vec<&'static str>,
     /// Folds of the cross-validation without which it would not be worth it. Where a rival would be chosen, it stands for the rival.
     pub(super) needs: Vec<usize>,
     /// True for a constant in the stead of which the free form of another cause's place would do as well, and beside which it still finds something: the
@@ -33,16 +36,20 @@ pub(super) fn standing(search: &Search, [best, without]: [(&Scored, &Screened); 
     let is_left_by_law = is_constant && is_left_by_law(search, best, without, index);
     let runs = search.split.all();
     if runs.len() < LEAST_RUNS {
-        return Standing { stability: None, needs: Vec::new(), is_left_by_law };
+        return Standing { stability: None, instead: Vec::new(), needs: Vec::new(), is_left_by_law };
     }
     let contest = Contest::new(search, best.0, without, index, fitted);
     let resamples: Vec<[usize; 2]> = (0..runs.len()).flat_map(|a| (0..=a).map(move |b| [a, b])).collect();
     let chosen = resamples.iter().filter(|left_out| contest.chooses(&left_out[..])).count();
+    let mut instead: Vec<&str> = resamples.iter().flat_map(|left_out| contest.chosen_instead(&left_out[..])).collect();
+    instead.sort_unstable();
+    instead.dedup();
     let places = |fold: &[usize]| -> Vec<usize> { (0..runs.len()).filter(|at| fold.contains(&runs[*at])).collect() };
     let folds = search.split.folds();
     let is_lost_without = |fold: &usize| !contest.shows(&places(&folds[*fold]));
     Standing {
         stability: Some(chosen as f64 / resamples.len() as f64),
+        instead,
         needs: (0..folds.len()).filter(is_lost_without).collect(),
         is_left_by_law,
     }
@@ -78,9 +85,9 @@ struct Contest {
     /// ... and the parts of its linear estimate.
     own_parts: Vec<[f64; 2]>,
     /// Fall of χ² in each run by each rival that was fitted.
-    fitted: Vec<Vec<f64>>,
+    fitted: Vec<(&'static str, Vec<f64>)>,
     /// Parts of the linear estimate of each other rival.
-    linear: Vec<Vec<[f64; 2]>>,
+    linear: Vec<(&'static str, Vec<[f64; 2]>)>,
 }
 
 impl Contest {
@@ -109,12 +116,16 @@ impl Contest {
             counts: runs.iter().map(|run| search.estimator.count(&[*run]) as f64).collect(),
             own: falls(best),
             own_parts: of(&column),
-            fitted: fitted.iter().filter(|trial| is_rival(trial.candidate)).map(|trial| falls(&trial.scored)).collect(),
+            fitted: fitted
+                .iter()
+                .filter(|trial| is_rival(trial.candidate))
+                .map(|trial| (search.id(trial.candidate), falls(&trial.scored)))
+                .collect(),
             linear: screened
                 .columns
                 .iter()
                 .filter(|(term, column)| is_linear(term, column))
-                .map(|(_, column)| of(column))
+                .map(|(term, column)| (search.id(term.candidate), of(column)))
                 .collect(),
         }
     }
@@ -135,8 +146,20 @@ impl Contest {
         let weights = self.weights(left_out);
         let (own, linear) = (weighted(&self.own, &weights), fall(&self.own_parts, &weights));
         self.shows(left_out)
-            && self.fitted.iter().all(|falls| weighted(falls, &weights) < own)
-            && self.linear.iter().all(|parts| fall(parts, &weights) < linear)
+            && self.fitted.iter().all(|(_, falls)| weighted(falls, &weights) < own)
+            && self.linear.iter().all(|(_, parts)| fall(parts, &weights) < linear)
+    }
+
+    /// The rivals that lower χ² further than the cause without the runs `left_out`, and nearly as far with them.
+    fn chosen_instead(&self, left_out: &[usize]) -> Vec<&'static str> {
+        let (some, all) = (self.weights(left_out), self.weights(&[]));
+        let is_rival = |of: &dyn Fn(&[f64]) -> [f64; 2]| {
+            let ([own, other], [own_of_all, other_of_all]) = (of(&some), of(&all));
+            other >= own && other_of_all > LEAST_TAKEN * own_of_all
+        };
+        let fitted = self.fitted.iter().filter(|(_, falls)| is_rival(&|w| [weighted(&self.own, w), weighted(falls, w)]));
+        let linear = self.linear.iter().filter(|(_, parts)| is_rival(&|w| [fall(&self.own_parts, w), fall(parts, w)]));
+        fitted.map(|(id, _)| *id).chain(linear.map(|(id, _)| *id)).collect()
     }
 }
 
@@ -161,4 +184,27 @@ fn fall(parts: &[[f64; 2]], weights: &[f64]) -> f64 {
     let sum = |k: usize| parts.iter().zip(weights).map(|(part, weight)| weight * part[k]).sum::<f64>();
     let along = sum(0).min(0.0);
     along * along / sum(1).max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_chosen_without_some_runs_and_takes_as_much_of_all_is_tied() {
+        let contest = |rival: [f64; 3]| Contest {
+            counts: vec![100.0; 3],
+            own: vec![50.0, 50.0, 20.0],
+            own_parts: vec![[0.0, 1.0]; 3],
+            fitted: vec![("rival", rival.to_vec())],
+            linear: Vec::new(),
+        };
+        // Without the first run the rival takes 72 against 70, of all runs 116 against 120.
+        let near = contest([44.0, 50.0, 22.0]);
+        assert!(near.chooses(&[]) && !near.chooses(&[0]));
+        assert_eq!((near.chosen_instead(&[0]), near.chosen_instead(&[])), (vec!["rival"], Vec::new()));
+        // Of all runs 82 only.
+        let far = contest([10.0, 50.0, 22.0]);
+        assert!(!far.chooses(&[0]) && far.chosen_instead(&[0]).is_empty());
+    }
 }

@@ -48,6 +48,8 @@ impl Ties {
                     let is_tied = search.is_tied(best, &scored);
                     Replacement { index, trial: Trial { scored, ..trial.clone() }, is_tied }
                 }
+                // With constants that the final elimination has left out it is no rival.
+                None if trial.scored.model().terms.len() != model.terms.len() => return None,
                 None => Replacement { index, trial: trial.clone(), is_tied: false },
             })
         };

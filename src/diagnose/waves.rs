@@ -1,0 +1,99 @@
+//! A plant for tests: sums of waves with noise.
+
+use super::DiagnoseError;
+use super::dataset::Role;
+use super::fit::Estimator;
+use super::plant::{Candidate, Free, Model, Nuisance, Plant, Signal, Term};
+use super::search::Search;
+use super::split::split;
+
+/// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
+pub(super) struct Waves {
+    signals: Vec<Signal>,
+    pub(super) candidates: Vec<Candidate>,
+}
+
+const VALUES: usize = 400;
+
+fn wave(id: &str, run: usize, at: usize) -> f64 {
+    let t = at as f64 / VALUES as f64 + 0.1 * run as f64;
+    match id {
+        "first" => (7.0 * t).sin(),
+        "second" => -(7.0 * t + 0.12).sin(),
+        _ => (23.0 * t).cos(),
+    }
+}
+
+impl Waves {
+    pub(super) fn new(of: &[(&str, f64)]) -> Self {
+        let signal = |run: usize| {
+            let value = |at: usize| {
+                let noise = (1.0 + (run * VALUES + at) as f64).sin() * 43_758.545_3;
+                // Uniform noise of unit variance.
+                let noise = (noise - noise.floor() - 0.5) * 12_f64.sqrt();
+                of.iter().map(|(id, x)| x * wave(id, run, at)).sum::<f64>() + noise
+            };
+            Signal {
+                id: format!("run {run}"),
+                values: (0..VALUES).map(value).collect(),
+                sigmas: vec![1.0; VALUES],
+                times: (0..VALUES).map(|at| at as f64).collect(),
+                channels: vec![0; VALUES],
+                inputs: (0..VALUES).map(|at| (at as f64 * (1.0 + run as f64) / 50.0).sin()).collect(),
+                ..Signal::default()
+            }
+        };
+        let candidate = |id: &'static str| Candidate {
+            id,
+            kind: "test",
+            cause: "A wave.",
+            places: vec!["test"],
+            is_free_form: false,
+            is_variant: false,
+            is_constant: false,
+            parameters: vec![Free { name: "x", unit: "", off: Some(0.0), bounds: [-100.0, 100.0], scale: 1.0, inverse: false }],
+            fixed: Vec::new(),
+            starts: vec![vec![1.0]],
+        };
+        let mut candidates = ["other", "first", "second"].map(candidate).to_vec();
+        // Another law of the second cause, with a part of the other one.
+        let mut variant = candidate("second");
+        variant.is_variant = true;
+        variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
+        variant.starts = vec![vec![1.0, 1.0]];
+        candidates.push(variant);
+        Self { signals: (0..6).map(signal).collect(), candidates }
+    }
+}
+
+impl Plant for Waves {
+    fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
+
+    fn channels(&self) -> Vec<String> {
+        vec!["y".into()]
+    }
+
+    fn unit(&self) -> &'static str {
+        ""
+    }
+
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
+        let of = |term: &Term, at| {
+            let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
+            term.x[0] * wave(self.candidates[term.candidate].id, run, at) + more
+        };
+        Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
+    }
+}
+
+/// A search in a plant, from nothing.
+pub(super) fn search(plant: &Waves) -> Search<'_> {
+    let split = split(plant, &[Role::Auto; 6]);
+    Search { estimator: Estimator::new(plant), split, unexplained: 0.0, limit: f64::INFINITY, progress: &|_: &str| {} }
+}
