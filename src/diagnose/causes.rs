@@ -61,26 +61,39 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
     // Two causes that cost more than the bench's faults alone are not what is missing where these leave next to nothing.
     let may_be_all = has_faults && search.share_left(calibrated) <= LEFT_SHARE;
     search.limit = if may_be_all { search.cost(calibrated) } else { f64::INFINITY };
-    let mut causes = select(search, &start, is_insufficient)?;
+    // Constants that stand in for faults may lead to where nothing can be simulated.
+    let plain = match select(search, &start, is_insufficient) {
+        Err(_) if has_faults => None,
+        plain => Some(plain?),
+    };
     search.limit = f64::INFINITY;
     // Causes that leave next to nothing without any fault are no faults.
-    let may_be_faults = has_faults && causes.share_left > SOUGHT;
-    if may_be_faults && (causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated)) {
-        (search.progress)("causes with faults of the bench in the way");
-        let plain = search.cost(&causes.best);
-        let after = (search.estimator.state(), search.split.clone());
-        search.estimator.restore(before.0);
-        search.split = before.1;
-        search.set_unexplained(calibrated);
-        let other = select(search, calibrated, is_insufficient)?;
-        if search.cost(&other.best) <= plain + LEAST_COST {
-            causes = other;
-        } else {
-            search.estimator.restore(after.0);
-            search.split = after.1;
-            search.set_unexplained(&start);
+    let may_be_faults = |causes: &Causes| {
+        let is_dearer = causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated);
+        has_faults && causes.share_left > SOUGHT && is_dearer
+    };
+    let mut causes = match plain {
+        Some(plain) if !may_be_faults(&plain) => plain,
+        plain => {
+            (search.progress)("causes with faults of the bench in the way");
+            let cost = plain.as_ref().map_or(f64::INFINITY, |plain| search.cost(&plain.best));
+            let after = (search.estimator.state(), search.split.clone());
+            search.estimator.restore(before.0);
+            search.estimator.held_spread = None;
+            search.split = before.1;
+            search.set_unexplained(calibrated);
+            let other = select(search, calibrated, is_insufficient)?;
+            match plain {
+                Some(plain) if search.cost(&other.best) > cost + LEAST_COST => {
+                    search.estimator.restore(after.0);
+                    search.split = after.1;
+                    search.set_unexplained(&start);
+                    plain
+                }
+                _ => other,
+            }
         }
-    }
+    };
     // What a name leaves, and what a cause takes, is no fault of the bench.
     search.estimator.held_spread = Some(causes.best.model().spread);
     name_causes(search, &mut causes)?;
