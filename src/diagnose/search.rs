@@ -546,7 +546,7 @@ impl Search<'_> {
         Ok(Responses { about, derivatives, starts })
     }
 
-    /// Starts of one law with the `change` of the residuals by each. One that changes them by far more than what is `missing` is moved nearer to where the cause has
+    /// Starts of one law with the `change` of the residuals by each. One that changes them by far more than what is `missing`, the norm of the residuals, is moved nearer to where the cause has
     /// no effect, until it changes them by about as much: what a cause does near a resonance is proportional to its parameters only as long as it is small.
     fn sized(&self, starts: &[Term], missing: f64, change: &impl Fn(&Term) -> Option<DVector<f64>>) -> Changes {
         let mut sized = Changes::new();
@@ -939,18 +939,11 @@ impl Search<'_> {
 
 /// True if a start lies on the line from where a law has no effect through another start, beyond that.
 fn is_beyond(start: &Term, near: &Term, parameters: &[Free]) -> bool {
-    let mut ratios = parameters.iter().zip(start.x.iter().zip(&near.x)).map(|(free, (x, near))| match free.off {
-        Some(off) => (x - off) / (near - off),
-        None => {
-            if x == near {
-                f64::INFINITY
-            } else {
-                0.0
-            }
-        }
-    });
-    let along = parameters.iter().position(|free| free.off.is_some()).and_then(|at| ratios.clone().nth(at)).unwrap_or(0.0);
-    along > 1.0 && ratios.all(|ratio| ratio == f64::INFINITY || (ratio / along - 1.0).abs() < 1e-9)
+    let pairs = || parameters.iter().zip(start.x.iter().zip(&near.x));
+    let is_same = pairs().all(|(free, (x, near))| free.off.is_some() || x == near);
+    let mut ratios = pairs().filter_map(|(free, (x, near))| free.off.map(|off| (x - off) / (near - off)));
+    let Some(along) = ratios.next() else { return false };
+    is_same && along > 1.0 && ratios.all(|ratio| (ratio / along - 1.0).abs() < 1e-9)
 }
 
 /// A model with more terms.

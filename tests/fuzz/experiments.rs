@@ -8,6 +8,7 @@ use sfers::effects::EFFECTS;
 use sfers::engine::Engine;
 use sfers::experiment::{self, Control, EngineKind, Experiment, SavedState, Source, StepConfig, presets::PRESETS};
 use sfers::export;
+use sfers::model::Segment;
 use sfers::recording::measures::Measures;
 use sfers::recording::{csv, npz};
 use sfers::view::{self, Kind};
@@ -318,13 +319,14 @@ pub fn give_export(input: &Input, _: &Path, _: &mut Random) -> Outcome {
     outputs::xml("MJCF", &export::mjcf(&experiment, "sfers mjcf --"), &names)?;
     let sidecar: Value = export::sidecar(&experiment, "sfers urdf");
     outputs::json("sidecar", &sidecar, &["floor", "period"])?;
-    let segments = experiment.robot.segments();
+    let (segments, bodies) = (experiment.robot.segments(), experiment.robot.rigid_bodies());
     // A body with a mass fixed to it is no even box, which reading refuses unless the mass is lost in rounding.
-    let loaded = experiment.robot.rigid_bodies().iter().zip(&segments).any(|(body, segment)| body.mass != segment.mass);
+    let is_loaded = bodies.iter().zip(&segments).any(|(body, segment)| body.mass != segment.mass);
+    let written: Vec<Segment> = bodies.iter().zip(segments).map(|(body, s)| Segment { mass: body.mass, ..s }).collect();
     match export::bodies(&urdf, &experiment.robot) {
-        Err(export::UrdfError::Element { .. }) if loaded => {}
+        Err(export::UrdfError::Element { .. }) if is_loaded => {}
         Err(error) => return Err(format!("URDF is not read back: {error}")),
-        Ok(bodies) if bodies != segments && !loaded => return Err("URDF comes back with other bodies".into()),
+        Ok(read) if read != written => return Err("URDF comes back with other bodies".into()),
         Ok(_) => {}
     }
     Ok(Fate::Accepted)
