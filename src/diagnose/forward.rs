@@ -2,7 +2,7 @@
 
 use super::DiagnoseError;
 use super::fit::{Convergence, sum_of_squares};
-use super::plant::{Model, Term};
+use super::plant::Term;
 use super::search::{LEAST_BIC, Scored, Screened, Search, Trial};
 
 /// Candidates that are fitted after screening, named ones and free forms.
@@ -114,10 +114,9 @@ impl Search<'_> {
     /// [`DiagnoseError`] if `from` or a leading candidate cannot be simulated.
     fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
-        let screened = self.screen(from)?;
-        let is_basic = |(_, model): &&(f64, Model)| model.terms.last().is_none_or(|term| !self.candidate(term).is_variant);
-        let (free, named): (Vec<_>, Vec<_>) =
-            screened.ranked.iter().filter(is_basic).partition(|(_, model)| self.ends_free(model));
+        // Other laws of a cause are tried once it is adopted.
+        let screened = self.screen_of(from, |candidate| !candidate.is_variant)?;
+        let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
         let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
         let most_free = free.first().map_or(0.0, |(gain, _)| *gain);
         let mut finalists = self.finalists(named.into_iter().filter(|(gain, _)| *gain >= PROMISING * most), FINALISTS);

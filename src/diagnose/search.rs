@@ -500,15 +500,7 @@ impl Search<'_> {
         Ok(scored)
     }
 
-    /// Linear estimates of how far every start of every candidate would lower χ² on all runs, beyond a refit of the model's own coordinates.
-    ///
-    /// # Errors
-    /// [`DiagnoseError`] if the model cannot be simulated.
-    pub fn screen(&self, from: &Scored) -> Result<Screened, DiagnoseError> {
-        self.screen_of(from, |_| true)
-    }
-
-    /// [`screen`](Self::screen) of those candidates that are wanted.
+    /// Linear estimates of how far every start of those candidates that are wanted would lower χ² on all runs, beyond a refit of the model's own coordinates.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
@@ -817,12 +809,7 @@ impl Search<'_> {
         let mut among_others = of(&others, &others);
         (0..others.len()).for_each(|k| among_others[(k, k)] *= 1.0 + LEAST_RIDGE);
         let Some(shift) = among_others.lu().solve(&-(of(&others, &own) * by)) else { return Ok(plain) };
-        let mut moved = plain.clone();
-        for ((term, parameter), by) in coordinates(&plain).into_iter().zip(shift.iter()) {
-            let [low, high] = self.candidate(&plain.terms[term]).parameters[parameter].bounds;
-            let x = &mut moved.terms[term].x[parameter];
-            *x = (*x + by).clamp(low, high);
-        }
+        let moved = self.moved_by(&plain, &shift);
         let chi2 = |model: &Model| -> Result<f64, DiagnoseError> {
             Ok(self.estimator.residuals_of(model, &self.split.fit)?.iter().map(|r| sum_of_squares(r)).sum())
         };
@@ -866,7 +853,7 @@ impl Search<'_> {
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         (self.progress)("screening all candidates beside the causes");
-        let responses = self.responses(best.model(), |_, candidate| !candidate.is_free_form)?;
+        let responses = self.responses(best.model(), |_, candidate| !candidate.is_free_form && !candidate.is_variant)?;
         for (index, removed) in best.model().terms.iter().enumerate() {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
@@ -874,6 +861,10 @@ impl Search<'_> {
             let Ok(without) = without else { continue };
             // What candidates do beside the cause leads to those that are worth a screening without it; other laws of a cause cannot be tried beside it.
             let own = without.total() - best.total();
+            // A constant that is freed beside a cause may take less than a cause has to.
+            if own < self.worth(&self.split.all()) {
+                continue;
+            }
             let beside = self.screened(&without, &responses, Some(index));
             let likely = beside.ranked.iter().take_while(|(gain, _)| *gain >= LIKELY_IN_PLACE * own);
             let likely: Vec<usize> = likely.filter_map(|(_, model)| Some(model.terms.last()?.candidate)).collect();
@@ -906,12 +897,14 @@ impl Search<'_> {
     }
 
     /// The discretisation with the least χ² over all runs, by steps from the present one. To rank models, steps end where they lower χ² by less than half
-    /// of what a cause would have to: finer models cost more, and the error that is left is adopted as no cause.
+    /// of what a cause would have to: finer models cost more, and the error that is left is adopted as no cause. Derivatives
+    /// hardly depend on the discretisation, so a step is fitted with those of the model first, and in full if that lowers χ².
     pub fn resolve(&self, best: Scored, convergence: Convergence) -> Scored {
         let least = match convergence {
             Convergence::Rank => 0.5 * self.worth(&self.split.all()),
             Convergence::Full => 0.0,
         };
+        let Ok(derivatives) = self.estimator.derivatives(best.model(), &self.split.fit) else { return best };
         let resolutions = self.estimator.plant.resolutions();
         let mut best = best;
         let mut tried = vec![best.model().resolution];
@@ -923,7 +916,10 @@ impl Search<'_> {
                 tried.push(resolution);
                 (self.progress)(&format!("{resolution} joints per actuator"));
                 // A discretisation in which the model diverges is none for it.
-                let Ok(other) = self.fitted(&Model { resolution, ..best.model().clone() }) else { continue };
+                let model = Model { resolution, ..best.model().clone() };
+                let near = self.estimator.fit_beyond(&model, &self.split.fit, &derivatives).and_then(|fit| self.score(fit));
+                let Some(near) = near.ok().filter(|near| near.total() < best.total()) else { continue };
+                let Ok(other) = self.fitted(near.model()) else { continue };
                 if other.total() < best.total() - least {
                     best = other;
                     moved = true;
@@ -934,6 +930,17 @@ impl Search<'_> {
                 return best;
             }
         }
+    }
+
+    /// A model with its coordinates moved, within their bounds.
+    fn moved_by(&self, model: &Model, by: &DVector<f64>) -> Model {
+        let mut moved = model.clone();
+        for ((term, parameter), by) in coordinates(model).into_iter().zip(by.iter()) {
+            let [low, high] = self.candidate(&model.terms[term]).parameters[parameter].bounds;
+            let x = &mut moved.terms[term].x[parameter];
+            *x = (*x + by).clamp(low, high);
+        }
+        moved
     }
 }
 
