@@ -1,11 +1,13 @@
 //! The causes of a misfit: selected without and with faults of the bench, named at their places, and refitted.
 
 use super::DiagnoseError;
-use super::diagnosis::Nearest;
+use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
 use super::naming::{self, Naming};
 use super::plant::Model;
 use super::search::{SOUGHT, Scored, Search, Trial};
+use super::smoothing::smoothed;
+use super::unseen::Unseen;
 use super::verdict::LEFT_SHARE;
 
 /// A model selected without the bench's faults counts if its cost, with ln N for each coordinate, is lower by this.
@@ -44,6 +46,8 @@ pub(super) struct Causes {
 /// cause. So causes are selected first without the bench's faults in the way. If faults are left after that, they are selected again with faults in
 /// the way, and the less costly model counts.
 ///
+/// A model with free forms that predicts runs left out worse than re-tuned constants do has followed single runs: causes are selected again by names only.
+///
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.
 pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
@@ -78,9 +82,9 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             (search.progress)("causes with faults of the bench in the way");
             let cost = plain.as_ref().map_or(f64::INFINITY, |plain| search.cost(&plain.best));
             let after = (search.estimator.state(), search.split.clone());
-            search.estimator.restore(before.0);
+            search.estimator.restore(before.0.clone());
             search.estimator.held_spread = None;
-            search.split = before.1;
+            search.split = before.1.clone();
             search.set_unexplained(calibrated);
             let other = select(search, calibrated, is_insufficient)?;
             match plain {
@@ -103,13 +107,31 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
     best = search.resolve(best, Convergence::Full);
     best = search.backward(best)?;
     causes.best = search.settle(best)?;
+    if follows_single_runs(search, &causes.best, calibrated)? {
+        (search.progress)("causes by names only");
+        search.estimator.restore(before.0);
+        search.split = before.1;
+        search.is_by_names = true;
+        return find(search, calibrated, is_insufficient);
+    }
     Ok(causes)
+}
+
+/// True if a model with free forms predicts runs that are left out worse than re-tuned constants do. Runs that judge are not looked at.
+fn follows_single_runs(search: &Search, best: &Scored, calibrated: &Scored) -> Result<bool, DiagnoseError> {
+    if !has_free_forms(search, best) || Unseen::by(search) == JudgedBy::JudgeRuns {
+        return Ok(false);
+    }
+    let unseen = |scored: &Scored| Unseen::of(search, scored, &[]);
+    Ok(unseen(&smoothed(search, best.clone()))?.is_worse_than(&unseen(calibrated)?))
+}
+
+fn has_free_forms(search: &Search, scored: &Scored) -> bool {
+    scored.model().terms.iter().any(|term| search.candidate(term).is_free_form)
 }
 
 /// Puts names in the stead of free forms where they stand.
 fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseError> {
-    let has_free_forms =
-        |search: &Search, scored: &Scored| scored.model().terms.iter().any(|term| search.candidate(term).is_free_form);
     if !has_free_forms(search, &causes.best) {
         return Ok(());
     }
@@ -197,4 +219,40 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     }
     let coarse_total = best.total();
     Ok(Causes { best, trials, replaced, coarse_total, spikes, share_left, open: f64::INFINITY, nearest: Vec::new() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::plant::Term;
+    use crate::diagnose::waves::{Waves, search};
+
+    #[test]
+    fn a_free_form_that_follows_single_runs_gives_way_to_names() {
+        for (hidden, follows) in [("other", false), ("once", true)] {
+            let mut plant = Waves::new(&[(hidden, 3.0)]);
+            let term = Term { candidate: 0, x: vec![1.0] };
+            let is_found = |plant: &Waves| {
+                let search = search(plant);
+                let constants = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+                let best = search.fitted(&Model::new(vec![term.clone()], 1.0, false)).unwrap();
+                follows_single_runs(&search, &best, &constants).unwrap()
+            };
+            assert!(!is_found(&plant), "no free form");
+            plant.candidates[0].is_free_form = true;
+            assert_eq!(is_found(&plant), follows, "{hidden}");
+        }
+    }
+
+    #[test]
+    fn names_only_leave_free_forms_out() {
+        let mut plant = Waves::new(&[("other", 1.0)]);
+        plant.candidates[0].is_free_form = true;
+        for (is_by_names, count) in [(false, 1), (true, 0)] {
+            let mut search = search(&plant);
+            search.is_by_names = is_by_names;
+            let calibrated = search.calibrated(1.0).unwrap();
+            assert_eq!(search.forward(calibrated).unwrap().0.model().terms.len(), count);
+        }
+    }
 }

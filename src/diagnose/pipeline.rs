@@ -138,7 +138,8 @@ fn prepare<'a>(plant: &'a dyn Plant, roles: &[Role], progress: &'a (dyn Fn(&str)
     let nominal_resolution = resolutions.first().copied().unwrap_or(1.0);
     let start = resolutions.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
     let estimator = Estimator::new(plant);
-    let mut search = Search { estimator, split: split(plant, roles), progress, unexplained: 0.0, limit: f64::INFINITY };
+    let mut search =
+        Search { estimator, split: split(plant, roles), progress, unexplained: 0.0, limit: f64::INFINITY, is_by_names: false };
     progress("the nominal model");
     let nominal = search.fitted(&Model::new(Vec::new(), nominal_resolution, true))?;
     progress("constants of the nominal model");

@@ -112,6 +112,8 @@ pub struct Search<'a> {
     pub unexplained: f64,
     /// Models with two causes that cost more are given up; infinite for none.
     pub limit: f64,
+    /// True if no free form is a candidate.
+    pub is_by_names: bool,
     /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }

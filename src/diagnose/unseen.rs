@@ -1,15 +1,15 @@
 //! Errors on runs that neither parameters nor selection saw.
 //!
 //! With enough runs some are kept to judge by, and seen once, at the end. With few runs the judgement is a nested cross-validation: each fold of the runs
-//! in turn is left out, the causes that would not be worth it without it are left out as well, the parameters are fitted to all other runs, and the fold is
-//! judged.
+//! in turn is left out, the causes that would not be worth it without it are left out as well, the parameters (where a cause is left out with all constants)
+//! are fitted to all other runs, and the fold is judged.
 
 use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::diagnosis::JudgedBy;
 use super::fit::{Convergence, Residuals, sum_of_squares};
-use super::plant::Model;
+use super::plant::{Model, Term};
 use super::search::{Scored, Search};
 
 /// Residuals of a model on the runs that judge it.
@@ -56,7 +56,7 @@ impl Unseen {
         Ok(Self { runs, plain, chi2: chi2.iter().sum() })
     }
 
-    /// The model as it is found without a fold.
+    /// The model as it is found without a fold. Where a cause is left out all constants are free, as they are before any cause is sought.
     fn without(
         search: &Search,
         model: &Model,
@@ -64,14 +64,21 @@ impl Unseen {
         needs: &[&[usize]],
     ) -> Result<Model, DiagnoseError> {
         let is_found = |index: &usize| needs.get(*index).is_none_or(|needs| !needs.contains(&fold));
-        let terms = (0..model.terms.len()).filter(is_found).map(|index| model.terms[index].clone()).collect();
+        let terms: Vec<Term> = (0..model.terms.len()).filter(is_found).map(|index| model.terms[index].clone()).collect();
+        let has_all = terms.len() == model.terms.len();
         let others: Vec<usize> = search.split.all().into_iter().filter(|other| !left_out.contains(other)).collect();
-        let model = Model { terms, ..model.clone() };
+        let found = Model { terms, ..model.clone() };
+        let model = if has_all { found } else { search.with_constants(&found) };
         // Nothing can be fitted without another run.
         if others.is_empty() || model.terms.is_empty() {
             return Ok(model);
         }
         Ok(search.estimator.fit(&model, &others, Convergence::Rank)?.model)
+    }
+
+    /// True if this model leaves more than another one.
+    pub(super) fn is_worse_than(&self, other: &Self) -> bool {
+        self.chi2 > other.chi2
     }
 
     /// Share of χ² above the noise that this model removes from another one's (0 to 1).
@@ -85,7 +92,7 @@ impl Unseen {
 mod tests {
     use super::*;
     use crate::diagnose::fit::Estimator;
-    use crate::diagnose::plant::{Candidate, Free, Nuisance, Plant, Signal, Term};
+    use crate::diagnose::plant::{Candidate, Free, Nuisance, Plant, Signal};
     use crate::diagnose::search::Search;
     use crate::diagnose::split::Split;
 
@@ -148,7 +155,7 @@ mod tests {
     }
 
     fn search<'a>(plant: &'a Means, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
-        Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY }
+        Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY, is_by_names: false }
     }
 
     #[test]
@@ -168,6 +175,11 @@ mod tests {
         // A fold without which the cause is not worth it is judged without the cause.
         let unseen = Unseen::of(&search, &with, &[&[2]]).unwrap();
         assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 9.0).abs() < 1e-9);
+        // With a constant that does the same it is judged by the mean of the others.
+        let mut tuned = self::plant(&[3.0, 6.0, 9.0]);
+        tuned.candidates.push(Candidate { id: "constant", is_constant: true, ..tuned.candidates[0].clone() });
+        let unseen = Unseen::of(&self::search(&tuned, search.split.clone(), &|_| {}), &with, &[&[2]]).unwrap();
+        assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 4.5).abs() < 1e-6);
     }
 
     #[test]

@@ -20,6 +20,8 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
     match id {
         "first" => (7.0 * t).sin(),
         "second" => -(7.0 * t + 0.12).sin(),
+        // Hidden in the first run only.
+        "once" if run > 0 => 0.0,
         _ => (23.0 * t).cos(),
     }
 }
@@ -95,5 +97,12 @@ impl Plant for Waves {
 /// A search in a plant, from nothing.
 pub(super) fn search(plant: &Waves) -> Search<'_> {
     let split = split(plant, &[Role::Auto; 6]);
-    Search { estimator: Estimator::new(plant), split, unexplained: 0.0, limit: f64::INFINITY, progress: &|_: &str| {} }
+    Search {
+        estimator: Estimator::new(plant),
+        split,
+        unexplained: 0.0,
+        limit: f64::INFINITY,
+        is_by_names: false,
+        progress: &|_: &str| {},
+    }
 }
