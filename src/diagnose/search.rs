@@ -855,7 +855,7 @@ impl Search<'_> {
     pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
         let mut found = Vec::new();
         (self.progress)("screening all candidates beside the causes");
-        let responses = self.responses(best.model(), |_, candidate| !candidate.is_free_form && !candidate.is_variant)?;
+        let responses = self.responses(best.model(), |_, candidate| !(candidate.is_free_form || candidate.is_variant))?;
         for (index, removed) in best.model().terms.iter().enumerate() {
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
