@@ -135,9 +135,15 @@ pub(super) fn adopted(
     let first = effects.len() - terms.len();
     let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < MINOR_MISFIT;
     let small: Vec<usize> = (0..terms.len()).filter(is_small).collect();
-    for (index, own) in needed_together(search, best, &whole, small) {
+    for Needed { index, own, instead } in needed_together(search, best, &whole, small) {
         taken[first + index] = own;
-        effects[first + index].share = whole.share(own, search.candidate(&terms[index]).is_constant);
+        let effect = &mut effects[first + index];
+        effect.share = whole.share(own, search.candidate(&terms[index]).is_constant);
+        if effect.stability.is_some_and(|share| share < LEAST_STABILITY) {
+            effect.tied_with.extend(instead.iter().map(|other| search.id(terms[*other].candidate).to_owned()));
+            effect.tied_with.sort_unstable();
+            effect.tied_with.dedup();
+        }
     }
     set_roles(&mut effects, &taken);
     let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
@@ -198,30 +204,48 @@ impl Whole {
     }
 }
 
-/// Those of the `small` terms without which much comes back once the others are left out, and how much (χ² per value): causes that can each do another one's work, as a
-/// stiffness a tip mass's, are not minor together. The least needed are left out first.
-fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec<usize>) -> Vec<(usize, f64)> {
+/// A small term without which much comes back once others are left out.
+#[derive(Debug)]
+struct Needed {
+    index: usize,
+    /// What comes back (χ² per value).
+    own: f64,
+    /// The terms that did its work before they were left out.
+    instead: Vec<usize>,
+}
+
+/// Those of the `small` terms without which much comes back once the others are left out: causes that can each do another one's work, as a stiffness a tip mass's,
+/// are not minor together. The least needed are left out first.
+fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec<usize>) -> Vec<Needed> {
     let candidate_of = |index: &usize| best.model().terms[*index].candidate;
     let count = search.estimator.count(&search.split.all()) as f64;
-    let (mut needed, mut rest) = (Vec::new(), best.clone());
+    let (mut needed, mut rest, mut left_out) = (Vec::new(), best.clone(), Vec::new());
     // One alone is as small as it is.
     if small.len() == 1 {
         return needed;
     }
+    let without = |from: &Scored, index: &usize| {
+        let at = from.model().terms.iter().position(|term| term.candidate == candidate_of(index))?;
+        // A model that cannot be simulated leaves the roles as they are.
+        search.ranked_at_its_spread(&search.without(from, at).ok()?).ok()
+    };
+    // Another term does a term's work if much comes back without the two.
+    let is_instead = |other: &usize, index: usize| {
+        let both = without(best, other).and_then(|rest| without(&rest, &index));
+        both.is_none_or(|both| search.chi2(&both) - search.chi2(best) >= MINOR_MISFIT * count)
+    };
     while !small.is_empty() {
-        let without = |index: &usize| {
-            let at = rest.model().terms.iter().position(|term| term.candidate == candidate_of(index))?;
-            // A model that cannot be simulated leaves the roles as they are.
-            search.ranked_at_its_spread(&search.without(&rest, at).ok()?).ok()
-        };
-        let shorter = small.iter().enumerate().filter_map(|(at, index)| Some((at, without(index)?)));
+        let shorter = small.iter().enumerate().filter_map(|(at, index)| Some((at, without(&rest, index)?)));
         let Some((at, least)) = shorter.min_by(|a, b| a.1.total().total_cmp(&b.1.total())) else { break };
         let index = small.remove(at);
         let own = (search.chi2(&least) - search.chi2(&rest)).max(0.0) / count;
         if own >= MINOR_MISFIT && whole.share(own, search.candidate(&best.model().terms[index]).is_constant) > MINOR_SHARE {
-            needed.push((index, own));
+            let is_one = left_out.len() == 1;
+            let instead = left_out.iter().copied().filter(|other| is_one || is_instead(other, index)).collect();
+            needed.push(Needed { index, own, instead });
         } else {
             rest = least;
+            left_out.push(index);
         }
     }
     needed
@@ -330,13 +354,16 @@ mod tests {
             let plant = Waves::new(&[("first", amplitude)]);
             let search = search(&plant);
             let bare = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
-            let both = [1, 2].map(|candidate| Term { candidate, x: vec![1.0] });
-            let best = search.fitted(&Model::new(both.to_vec(), 1.0, false)).unwrap();
+            let all = [0, 1, 2].map(|candidate| Term { candidate, x: vec![1.0] });
+            let best = search.fitted(&Model::new(all.to_vec(), 1.0, false)).unwrap();
             let whole = Whole::of(&search, &best, &bare).unwrap();
-            let found = needed_together(&search, &best, &whole, vec![0, 1]);
+            let found = needed_together(&search, &best, &whole, vec![0, 1, 2]);
             assert_eq!(found.len(), needed, "{found:?}");
-            // The mean square of the wave.
-            assert!(found.iter().all(|(_, own)| (own / 12.5 - 1.0).abs() < 0.1), "{found:?}");
+            for Needed { index, own, instead } in found {
+                // The mean square of the wave.
+                assert!((own / 12.5 - 1.0).abs() < 0.1, "{own}");
+                assert_eq!(instead, [3 - index]);
+            }
         }
     }
 }
