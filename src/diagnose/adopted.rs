@@ -69,14 +69,19 @@ fn weighed(
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
     let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with).unzip();
     let (shared, both) = shared(search, best, (screened, responses), index).unzip();
-    if standing.stability.is_some_and(|share| share < LEAST_STABILITY) {
-        tied_with.extend(standing.instead.iter().map(|id| (*id).to_owned()));
-    }
     tied_with.extend(set.into_iter().chain(shared));
-    tied_with.sort_unstable();
-    tied_with.dedup();
+    tie_unstable(standing.stability, &mut tied_with, &standing.instead);
     let pair = pair.or(both);
     Ok(Weighed { without, standing, tied_with, pair })
+}
+
+/// Ties a cause of this `stability` with those that are chosen `instead` or do its work, if it is unstable; ties in alphabetic order.
+fn tie_unstable(stability: Option<f64>, tied_with: &mut Vec<String>, instead: &[&str]) {
+    if stability.is_some_and(|share| share < LEAST_STABILITY) {
+        tied_with.extend(instead.iter().map(|id| (*id).to_owned()));
+    }
+    tied_with.sort_unstable();
+    tied_with.dedup();
 }
 
 /// Adopted causes and the judgement of the model with all of them.
@@ -110,17 +115,19 @@ pub(super) fn adopted(
         .map(|index| weighed(search, (best, &screened), index, ties, &responses))
         .collect::<Result<_, DiagnoseError>>()?;
     let needs: Vec<&[usize]> = weighed.iter().map(|weighed| weighed.standing.needs.as_slice()).collect();
-    let unseen = Unseen::of(search, best, &needs)?;
+    // Gains are of causes, not of the constants that are free where a fold leaves one out.
+    let tuned = needs.concat();
+    let unseen = Unseen::of(search, best, &needs, &tuned)?;
     let mut effects = Vec::new();
     if judged.refined {
-        let coarse = Unseen::of(search, &judged.coarse, &needs)?;
+        let coarse = Unseen::of(search, &judged.coarse, &needs, &tuned)?;
         effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
     }
     let (whole, mut taken) = (Whole::of(search, best, bare)?, vec![0.0; effects.len()]);
     for (index, Weighed { without, standing, tied_with, .. }) in weighed.iter().enumerate() {
         let mut others = needs.clone();
         others.remove(index);
-        let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others)?, search);
+        let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others, &tuned)?, search);
         let mut effect = effect(search, judged, index, standing, tied_with);
         let own = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
         taken.push(own);
@@ -139,11 +146,8 @@ pub(super) fn adopted(
         taken[first + index] = own;
         let effect = &mut effects[first + index];
         effect.share = whole.share(own, search.candidate(&terms[index]).is_constant);
-        if effect.stability.is_some_and(|share| share < LEAST_STABILITY) {
-            effect.tied_with.extend(instead.iter().map(|other| search.id(terms[*other].candidate).to_owned()));
-            effect.tied_with.sort_unstable();
-            effect.tied_with.dedup();
-        }
+        let instead: Vec<&str> = instead.iter().map(|other| search.id(terms[*other].candidate)).collect();
+        tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
     set_roles(&mut effects, &taken);
     let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
@@ -346,6 +350,15 @@ mod tests {
         let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
         set_roles(&mut within_the_noise, &[0.2]);
         assert_eq!(within_the_noise[0].role, Minor);
+    }
+
+    #[test]
+    fn unstable_causes_only_are_tied_with_what_is_chosen_instead() {
+        for (stability, tied) in [(Some(0.79), vec!["a", "b", "c"]), (Some(0.8), vec!["b"]), (None, vec!["b"])] {
+            let mut tied_with = vec!["b".to_owned()];
+            tie_unstable(stability, &mut tied_with, &["c", "a", "b"]);
+            assert_eq!(tied_with, tied, "{stability:?}");
+        }
     }
 
     #[test]

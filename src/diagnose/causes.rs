@@ -122,7 +122,7 @@ fn follows_single_runs(search: &Search, best: &Scored, calibrated: &Scored) -> R
     if !has_free_forms(search, best) || Unseen::by(search) == JudgedBy::JudgeRuns {
         return Ok(false);
     }
-    let unseen = |scored: &Scored| Unseen::of(search, scored, &[]);
+    let unseen = |scored: &Scored| Unseen::of(search, scored, &[], &[]);
     Ok(unseen(&smoothed(search, best.clone()))?.is_worse_than(&unseen(calibrated)?))
 }
 

@@ -279,7 +279,7 @@ impl Report<'_, '_> {
     fn stages(&self) -> Result<[Stage; 3], DiagnoseError> {
         let Self { search, judged, nominal, calibrated, .. } = self;
         let constants = intervals_of(search, calibrated, &[])?;
-        let of_runs = |scored: &Scored| Unseen::of(search, scored, &[]);
+        let of_runs = |scored: &Scored| Unseen::of(search, scored, &[], &[]);
         Ok([
             self.stage(nominal, &of_runs(nominal)?, Vec::new()),
             self.stage(calibrated, &of_runs(calibrated)?, self.parameters(calibrated, &constants)),

@@ -873,17 +873,11 @@ impl Search<'_> {
             let is_law = |c: &Candidate| c.id == self.id(removed.candidate) && !c.is_free_form;
             let is_likely = |at: usize, c: &Candidate| at != removed.candidate && (likely.contains(&at) || is_law(c));
             let screened = self.screened(&without, &self.responses(without.model(), is_likely)?, None);
-            let promising: Vec<_> = screened.ranked.iter().filter(|(gain, _)| *gain >= PROMISING_IN_PLACE * own).collect();
-            // One law of each cause, the plain one if it is promising: the others are tried once it has the place.
-            for model in first_of_each(promising.iter().copied(), most, |term| self.id(term.candidate)) {
-                let candidate_of = |model: &Model| model.terms.last().map(|term| self.candidate(term));
-                let Some(id) = candidate_of(&model).map(|own| own.id) else { continue };
-                let is_plain = |(_, other): &&&(f64, Model)| {
-                    candidate_of(other).is_some_and(|c| c.id == id && (!c.is_variant || id == self.id(removed.candidate)))
-                };
-                let model = promising.iter().find(is_plain).map_or(&model, |(_, plain)| plain);
+            let promising = screened.ranked.iter().filter(|(gain, _)| *gain >= PROMISING_IN_PLACE * own);
+            // Other laws of another cause are tried once it has the place.
+            for model in first_of_each(promising, most, |term| self.id(term.candidate)) {
                 let Some(candidate) = model.terms.last().map(|term| term.candidate) else { continue };
-                if let Ok(scored) = self.ranked_beyond(model, &screened) {
+                if let Ok(scored) = self.ranked_beyond(&model, &screened) {
                     found.push((removed.candidate, Trial { candidate, scored: self.in_its_resolution(scored, best) }));
                 }
             }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::diagnosis::JudgedBy;
 use super::fit::{Convergence, Residuals, sum_of_squares};
-use super::plant::{Model, Term};
+use super::plant::Model;
 use super::search::{Scored, Search};
 
 /// Residuals of a model on the runs that judge it.
@@ -28,19 +28,20 @@ impl Unseen {
         if search.split.judge.is_empty() { JudgedBy::CrossValidation } else { JudgedBy::JudgeRuns }
     }
 
-    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be worth it. A run that cannot be simulated with what was
+    /// Judges a model; `needs` holds for each of its terms the folds without which it would not be worth it. In the folds `tuned` all constants are free, as they are
+    /// before any cause is sought: those in which the model that is judged, or the one that it is compared with, lacks a cause. A run that cannot be simulated with what was
     /// fitted to others is judged by the nominal model: there the causes are worth nothing.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the nominal model cannot be simulated.
-    pub(super) fn of(search: &Search, scored: &Scored, needs: &[&[usize]]) -> Result<Self, DiagnoseError> {
+    pub(super) fn of(search: &Search, scored: &Scored, needs: &[&[usize]], tuned: &[usize]) -> Result<Self, DiagnoseError> {
         let (mut runs, mut models) = (Vec::new(), Vec::new());
         for run in &search.split.judge {
             runs.push(*run);
             models.push(scored.model().clone());
         }
         for (fold, left_out) in search.split.folds().into_iter().enumerate() {
-            let model = Self::without(search, scored.model(), (fold, &left_out), needs)?;
+            let model = Self::without(search, scored.model(), (fold, &left_out), needs, tuned.contains(&fold))?;
             models.extend(left_out.iter().map(|_| model.clone()));
             runs.extend(left_out);
         }
@@ -56,19 +57,19 @@ impl Unseen {
         Ok(Self { runs, plain, chi2: chi2.iter().sum() })
     }
 
-    /// The model as it is found without a fold. Where a cause is left out all constants are free, as they are before any cause is sought.
+    /// The model as it is found without a fold.
     fn without(
         search: &Search,
         model: &Model,
         (fold, left_out): (usize, &[usize]),
         needs: &[&[usize]],
+        is_tuned: bool,
     ) -> Result<Model, DiagnoseError> {
         let is_found = |index: &usize| needs.get(*index).is_none_or(|needs| !needs.contains(&fold));
-        let terms: Vec<Term> = (0..model.terms.len()).filter(is_found).map(|index| model.terms[index].clone()).collect();
-        let has_all = terms.len() == model.terms.len();
+        let terms = (0..model.terms.len()).filter(is_found).map(|index| model.terms[index].clone()).collect();
         let others: Vec<usize> = search.split.all().into_iter().filter(|other| !left_out.contains(other)).collect();
         let found = Model { terms, ..model.clone() };
-        let model = if has_all { found } else { search.with_constants(&found) };
+        let model = if is_tuned { search.with_constants(&found) } else { found };
         // Nothing can be fitted without another run.
         if others.is_empty() || model.terms.is_empty() {
             return Ok(model);
@@ -92,7 +93,7 @@ impl Unseen {
 mod tests {
     use super::*;
     use crate::diagnose::fit::Estimator;
-    use crate::diagnose::plant::{Candidate, Free, Nuisance, Plant, Signal};
+    use crate::diagnose::plant::{Candidate, Free, Nuisance, Plant, Signal, Term};
     use crate::diagnose::search::Search;
     use crate::diagnose::split::Split;
 
@@ -166,20 +167,25 @@ mod tests {
         let (with, without) = (search.fitted(&mean).unwrap(), search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap());
         assert_eq!(Unseen::by(&search), JudgedBy::CrossValidation);
         // Without run k the mean of the others is 7.5, 6 and 4.5: off by −4.5, 0 and 4.5.
-        let unseen = Unseen::of(&search, &with, &[&[]]).unwrap();
+        let unseen = Unseen::of(&search, &with, &[&[]], &[]).unwrap();
         let means: Vec<f64> = unseen.plain.iter().map(|r| r.iter().sum::<f64>() / 4.0).collect();
         assert!(means.iter().zip([-4.5, 0.0, 4.5]).all(|(a, b)| (a - b).abs() < 1e-6), "{means:?}");
         // χ² is 4 (m² + 1) a run: 12 + 162 of the model, 12 + 504 without it, of which 12 are noise.
-        let gain = unseen.gain_over(&Unseen::of(&search, &without, &[]).unwrap(), &search);
+        let gain = unseen.gain_over(&Unseen::of(&search, &without, &[], &[]).unwrap(), &search);
         assert!((gain - 342.0 / 504.0).abs() < 1e-6, "{gain}");
         // A fold without which the cause is not worth it is judged without the cause.
-        let unseen = Unseen::of(&search, &with, &[&[2]]).unwrap();
+        let unseen = Unseen::of(&search, &with, &[&[2]], &[2]).unwrap();
         assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 9.0).abs() < 1e-9);
         // With a constant that does the same it is judged by the mean of the others.
         let mut tuned = self::plant(&[3.0, 6.0, 9.0]);
         tuned.candidates.push(Candidate { id: "constant", is_constant: true, ..tuned.candidates[0].clone() });
-        let unseen = Unseen::of(&self::search(&tuned, search.split.clone(), &|_| {}), &with, &[&[2]]).unwrap();
+        let unseen = Unseen::of(&self::search(&tuned, search.split.clone(), &|_| {}), &with, &[&[2]], &[2]).unwrap();
         assert!((unseen.plain[2].iter().sum::<f64>() / 4.0 - 4.5).abs() < 1e-6);
+        // What the constant does there is no gain of the cause.
+        let of = |scored: &Scored, needs: &[&[usize]]| {
+            Unseen::of(&self::search(&tuned, search.split.clone(), &|_| {}), scored, needs, &[0, 1, 2])
+        };
+        assert!(of(&with, &[&[0, 1, 2]]).unwrap().gain_over(&of(&without, &[]).unwrap(), &search).abs() < 1e-9);
     }
 
     #[test]
@@ -190,7 +196,7 @@ mod tests {
         let with = search.fitted(&start).unwrap();
         assert!((with.model().terms[0].x[0] - 6.0).abs() < 1e-6, "{:?}", with.model());
         // The other runs say 7.5, with which the first one cannot be simulated.
-        let first = &Unseen::of(&search, &with, &[&[]]).unwrap().plain[0];
+        let first = &Unseen::of(&search, &with, &[&[]], &[]).unwrap().plain[0];
         assert!((first.iter().sum::<f64>() / 4.0 - 3.0).abs() < 1e-9, "{first:?}");
     }
 
@@ -200,7 +206,7 @@ mod tests {
         let search = search(&plant, Split { fit: vec![0, 1], select: vec![2], judge: vec![3] }, &|_| {});
         let scored = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![0.0] }], 1.0, false)).unwrap();
         assert!((scored.model().terms[0].x[0] - 4.0).abs() < 1e-6);
-        let unseen = Unseen::of(&search, &scored, &[&[]]).unwrap();
+        let unseen = Unseen::of(&search, &scored, &[&[]], &[]).unwrap();
         assert_eq!((Unseen::by(&search), unseen.runs.clone()), (JudgedBy::JudgeRuns, vec![3]));
         assert!((unseen.plain[0].iter().sum::<f64>() / 4.0 - 86.0).abs() < 1e-6);
     }
