@@ -8,7 +8,7 @@ use super::intervals::Intervals;
 use super::plant::{Model, Term};
 use super::search::{Responses, Scored, Screened, Search, VISIBLE};
 use super::stability::{Standing, standing};
-use super::ties::{Ties, pair_in_place, shared};
+use super::ties::{Ties, pairs_in_place, shared};
 use super::unseen::Unseen;
 use super::verdict::Judged;
 
@@ -50,8 +50,8 @@ struct Weighed {
     standing: Standing,
     /// Causes, or sets of two, that the data cannot tell from it.
     tied_with: Vec<String>,
-    /// The model with such a set.
-    pair: Option<Model>,
+    /// The models with such sets.
+    pairs: Vec<Model>,
 }
 
 /// Weighs term `index` of `best`, given its screening and what all candidates do beside it.
@@ -67,12 +67,12 @@ fn weighed(
     let mut tied_with = ties.of(search, best, index);
     let without_it = search.screened(&without, responses, Some(index));
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
-    let (set, pair) = pair_in_place(search, best, (&without, &without_it), index, &tied_with).unzip();
-    let (shared, both) = shared(search, best, (screened, responses), index).unzip();
-    tied_with.extend(set.into_iter().chain(shared));
+    let mut pairs = pairs_in_place(search, best, (&without, &without_it), index, &tied_with);
+    pairs.extend(shared(search, best, (screened, responses), index));
+    let (sets, pairs): (Vec<String>, Vec<Model>) = pairs.into_iter().unzip();
+    tied_with.extend(sets);
     tie_unstable(standing.stability, &mut tied_with, &standing.instead);
-    let pair = pair.or(both);
-    Ok(Weighed { without, standing, tied_with, pair })
+    Ok(Weighed { without, standing, tied_with, pairs })
 }
 
 /// Ties a cause of this `stability` with those that are chosen `instead` or do its work, if it is unstable; ties in alphabetic order.
@@ -150,7 +150,7 @@ pub(super) fn adopted(
         tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
     set_roles(&mut effects, &taken);
-    let pairs = weighed.into_iter().filter_map(|weighed| weighed.pair).collect();
+    let pairs = weighed.into_iter().flat_map(|weighed| weighed.pairs).collect();
     Ok(Adoption { effects, unseen, pairs })
 }
 

@@ -5,7 +5,7 @@ use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
 use super::naming::{self, Naming};
 use super::plant::Model;
-use super::search::{SOUGHT, Scored, Search, Trial};
+use super::search::{LEAST_GAIN, SOUGHT, Scored, Search, Trial};
 use super::smoothing::smoothed;
 use super::unseen::Unseen;
 use super::verdict::LEFT_SHARE;
@@ -142,8 +142,7 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     causes.best = search.backward(best)?;
     let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
     if ids(causes.best.model()) != ids(&before) {
-        // None for a model at the edge of what can be simulated, as in `select`.
-        causes.replaced = search.replacements(&causes.best, REPLACEMENTS).unwrap_or_default();
+        (causes.best, causes.replaced) = replace(search, causes.best.clone())?;
     }
     causes.coarse_total = causes.best.total();
     Ok(())
@@ -183,42 +182,63 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.backward(best)?;
     }
 
-    // A model at the edge of what can be simulated has no derivatives to compare others by.
-    let replacements = |search: &Search, best: &Scored| {
-        let has_none = is_insufficient || best.model().terms.is_empty();
-        if has_none { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
-    };
-    let mut replaced = replacements(search, &best);
-    for _ in 0..MOST_REPLACED {
-        let better = replaced
-            .iter()
-            .filter(|(removed, trial)| {
-                let other = &trial.scored;
-                // A law with a further parameter gives way to another cause that does without one and leaves hardly more.
-                let has_further = best.model().terms.iter().any(|t| t.candidate == *removed && search.candidate(t).is_variant)
-                    && search.id(trial.candidate) != search.id(*removed);
-                let simpler = other.freedom() < best.freedom()
-                    && (search.is_tied(&best, other) || (has_further && !search.is_worth(&best, other)));
-                // Of tied causes the likelier one leads; more parameters have to be worth it.
-                let likelier = other.freedom() <= best.freedom() && other.total() < best.total() - LIKELIER;
-                let better = other.total() < best.total() && !search.is_tied(other, &best);
-                simpler || likelier || (better && search.is_worth(other, &best))
-            })
-            .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()))
-            .map(|(_, trial)| trial.scored.clone());
-        let Some(better) = better else { break };
-        best = search.settle(better)?;
-        best = search.backward(best)?;
-        // A cause in a constant's place lets the constant stay free beside it.
-        best = search.with_significant_constants(best)?;
-        replaced = replacements(search, &best);
-    }
+    best = constants_for_discretisation(search, best, calibrated.model().resolution)?;
+    let (mut best, replaced) = replace(search, best)?;
     let faults_come_last = search.estimator.held_spread.take().is_some();
     if search.measure_noise(&best)? || faults_come_last {
         best = search.settle(best)?;
     }
     let coarse_total = best.total();
     Ok(Causes { best, trials, replaced, coarse_total, spikes, share_left, open: f64::INFINITY, nearest: Vec::new() })
+}
+
+/// The model with free constants at the `resolution` that the search began with, if it costs less: another discretisation shifts the resonances as a
+/// stiffness does, and may stand for one that was not looked for yet when it was chosen.
+fn constants_for_discretisation(search: &Search, best: Scored, resolution: f64) -> Result<Scored, DiagnoseError> {
+    if best.model().resolution == resolution || search.above(&best) < LEAST_GAIN {
+        return Ok(best);
+    }
+    (search.progress)("constants in the place of the discretisation");
+    let other = search.fitted(&Model { resolution, ..search.with_constants(best.model()) });
+    // Constants that nothing needs are none.
+    let other = other.and_then(|other| search.backward(search.resolve(other, Convergence::Rank)));
+    Ok(other.ok().filter(|other| search.cost(other) < search.cost(&best)).unwrap_or(best))
+}
+
+/// Replaces causes by others that leave less, or that need fewer parameters and leave hardly more: the model, and the replacements of its causes.
+fn replace(search: &mut Search, mut best: Scored) -> Result<(Scored, Vec<(usize, Trial)>), DiagnoseError> {
+    // A model at the edge of what can be simulated has no derivatives to compare others by.
+    let replacements = |search: &Search, best: &Scored| {
+        if best.model().terms.is_empty() { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
+    };
+    let mut replaced = replacements(search, &best);
+    for _ in 0..MOST_REPLACED {
+        let better = replaced
+            .iter()
+            .filter(|(removed, trial)| is_better(search, *removed, trial, &best))
+            .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()));
+        let Some((_, better)) = better else { break };
+        best = search.settle(better.scored.clone())?;
+        best = search.backward(best)?;
+        // A cause in a constant's place lets the constant stay free beside it.
+        best = search.with_significant_constants(best)?;
+        replaced = replacements(search, &best);
+    }
+    Ok((best, replaced))
+}
+
+/// True if a trial is to be preferred to the model `best`, in which it takes the place of the candidate `removed`.
+fn is_better(search: &Search, removed: usize, trial: &Trial, best: &Scored) -> bool {
+    let other = &trial.scored;
+    // A law with a further parameter gives way to another cause that does without one and leaves hardly more.
+    let has_further = best.model().terms.iter().any(|t| t.candidate == removed && search.candidate(t).is_variant)
+        && search.id(trial.candidate) != search.id(removed);
+    let simpler =
+        other.freedom() < best.freedom() && (search.is_tied(best, other) || (has_further && !search.is_worth(best, other)));
+    // Of tied causes the likelier one leads; more parameters have to be worth it.
+    let likelier = other.freedom() <= best.freedom() && other.total() < best.total() - LIKELIER;
+    let better = other.total() < best.total() && !search.is_tied(other, best);
+    simpler || likelier || (better && search.is_worth(other, best))
 }
 
 #[cfg(test)]

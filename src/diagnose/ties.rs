@@ -8,6 +8,8 @@ use super::search::{LEAST_BIC, Responses, Scored, Screened, Search, Trial};
 const NEAR_TIE: f64 = 500.0;
 /// Two causes together are fitted in the place of one if their linear estimate is at least this share of what it takes.
 const PROMISING_PAIR: f64 = 0.9;
+/// Sets of two that are fitted in the place of one: as good ones differ in causes that the data cannot tell apart.
+const MOST_PAIRS: usize = 3;
 /// A cause shares its place with another one if that moves its first parameter by this share of the distance from where it has no effect.
 const LEAST_MOVED: f64 = 0.25;
 
@@ -84,48 +86,47 @@ impl Ties {
     }
 }
 
-/// Two causes together that the data cannot tell from term `index` of `best`, which `without` lacks: their ids with a plus sign, and the model with them;
-/// none if there are none, if one of them is tied alone, or if they cannot be simulated.
-pub(super) fn pair_in_place(
+/// Ids of two causes with a plus sign, and the model with both.
+pub(super) type Pair = (String, Model);
+
+/// Sets of two causes that the data cannot tell from term `index` of `best`, which `without` lacks; none of causes that are tied alone, or that cannot be simulated.
+pub(super) fn pairs_in_place(
     search: &Search,
     best: &Scored,
     (without, screened): (&Scored, &Screened),
     index: usize,
     tied: &[String],
-) -> Option<(String, Model)> {
+) -> Vec<Pair> {
     let own = search.candidate(&best.model().terms[index]);
     let taken = without.total() - best.total();
     // A cause within the noise is not taken apart.
     if own.is_free_form || taken < NEAR_TIE {
-        return None;
+        return Vec::new();
     }
     let is_wanted = |term: &Term| {
         let id = search.id(term.candidate);
         id != own.id && !tied.iter().any(|tied| tied == id)
     };
     if let Some(plain) = search.plain_law(best.model(), index) {
-        return beside_plain_law(search, best, &plain, own.id, is_wanted);
+        return beside_plain_law(search, best, &plain, own.id, is_wanted).into_iter().collect();
     }
     // One with several parameters of its own is taken apart no further.
     if own.parameters.len() > 1 {
-        return None;
+        return Vec::new();
     }
-    let pairs = search.sets(without.model(), screened, 2, is_wanted);
-    let (_, pair) = pairs.first().filter(|(gain, _)| *gain > PROMISING_PAIR * taken)?;
-    (search.progress)(&format!("two causes in the place of {}", own.id));
-    let [.., first, second] = &pair.terms[..] else { return None };
-    let set = in_words(search.id(first.candidate), search.id(second.candidate));
-    tied_model(search, best, pair, screened).map(|both| (set, both))
+    let sets = search.sets(without.model(), screened, 2, is_wanted);
+    let promising = sets.iter().take_while(|(gain, _)| *gain > PROMISING_PAIR * taken).take(MOST_PAIRS);
+    let tied = promising.filter_map(|(_, pair)| {
+        (search.progress)(&format!("two causes in the place of {}", own.id));
+        let [.., first, second] = &pair.terms[..] else { return None };
+        let set = in_words(search.id(first.candidate), search.id(second.candidate));
+        tied_model(search, best, pair, screened).map(|both| (set, both))
+    });
+    tied.collect()
 }
 
 /// The `plain` law of the cause `own` with another cause beside it, for which the law with a further parameter in `best` may stand.
-fn beside_plain_law(
-    search: &Search,
-    best: &Scored,
-    plain: &Model,
-    own: &str,
-    is_wanted: impl Fn(&Term) -> bool,
-) -> Option<(String, Model)> {
+fn beside_plain_law(search: &Search, best: &Scored, plain: &Model, own: &str, is_wanted: impl Fn(&Term) -> bool) -> Option<Pair> {
     (search.progress)(&format!("another cause beside the plain law of {own}"));
     let plain = search.ranked_at_its_spread(plain).ok()?;
     let screened = search.screen_of(&plain, |candidate| !(candidate.is_free_form || candidate.is_variant)).ok()?;
@@ -137,39 +138,43 @@ fn beside_plain_law(
 }
 
 /// A cause with another one beside it that does much of its work: the other one lowers χ² beyond chance, if not by as much as is worth a cause, and moves the
-/// first parameter of term `index` of `best` by [`LEAST_MOVED`]. Their ids with a plus sign, and the model with both; none if there is none.
-pub(super) fn shared(
-    search: &Search,
-    best: &Scored,
-    (screened, responses): (&Screened, &Responses),
-    index: usize,
-) -> Option<(String, Model)> {
+/// first parameter of term `index` of `best` by [`LEAST_MOVED`]. The best such set, and those that the data cannot tell from it.
+pub(super) fn shared(search: &Search, best: &Scored, (screened, responses): (&Screened, &Responses), index: usize) -> Vec<Pair> {
     let own = search.candidate(&best.model().terms[index]);
-    let (at, off) = own.parameters.iter().enumerate().find_map(|(k, free)| Some((k, free.off?)))?;
-    if own.is_free_form {
-        return None;
-    }
+    let with_off = own.parameters.iter().enumerate().find_map(|(k, free)| Some((k, free.off?)));
+    let Some((at, off)) = with_off.filter(|_| !own.is_free_form) else { return Vec::new() };
+    let Some(coordinate) = coordinates(best.model()).iter().position(|of| *of == (index, at)) else { return Vec::new() };
     let moved = |model: &Model| {
         let x = model.terms[index].x[at];
         (x - best.model().terms[index].x[at]).abs() / (best.model().terms[index].x[at] - off).abs().max(f64::MIN_POSITIVE)
     };
-    let coordinate = coordinates(best.model()).iter().position(|of| *of == (index, at))?;
     let is_law = |term: &Term| !search.candidate(term).is_free_form && !search.candidate(term).is_variant;
-    let promising = screened.ranked.iter().filter(|(gain, _)| *gain > LEAST_BIC);
-    let mut shares = promising.filter_map(|(_, model)| {
+    // The model with another cause beside this one, the linear estimate of its gain, and whether it does nearly what this one does.
+    let promising = |(gain, model): &(f64, Model)| {
         let term = model.terms.last().filter(|term| is_law(term) && search.id(term.candidate) != own.id)?;
-        let by = responses.shift(term, coordinate, search)?;
         let mut with = best.model().clone();
-        with.terms[index].x[at] += by;
-        (moved(&with) > LEAST_MOVED || responses.is_alike(term, coordinate)).then_some(model)
-    });
-    let model = shares.next()?;
-    let other = search.id(model.terms.last()?.candidate);
-    (search.progress)(&format!("{other} beside {}", own.id));
-    let start = search.start_beyond(model, screened).ok()?;
-    let both = search.fitted_at_its_spread(&start).ok()?;
-    let is_shared = moved(both.model()) > LEAST_MOVED && search.is_significant_on(&search.split.all(), &both, best);
-    is_shared.then(|| (in_words(own.id, other), both.model().clone()))
+        with.terms[index].x[at] += responses.shift(term, coordinate, search)?;
+        let is_alike = responses.is_alike(term, coordinate);
+        (is_alike || moved(&with) > LEAST_MOVED).then(|| (*gain, is_alike, model.clone()))
+    };
+    let others = screened.ranked.iter().take_while(|(gain, _)| *gain > LEAST_BIC).filter_map(promising);
+    let mut others: Vec<(f64, bool, Model)> = others.collect();
+    // What is alike is small beside this cause, and so is not well known by a linear estimate.
+    let least = others.first().map_or(0.0, |(gain, ..)| PROMISING_PAIR * gain);
+    others.retain(|(gain, is_alike, _)| *is_alike || *gain > least);
+    let with = |(_, _, model): &(f64, bool, Model)| {
+        let other = search.id(model.terms.last()?.candidate);
+        (search.progress)(&format!("{other} beside {}", own.id));
+        let start = search.start_beyond(model, screened).ok()?;
+        let both = search.fitted_at_its_spread(&start).ok()?;
+        let is_shared = moved(both.model()) > LEAST_MOVED && search.is_significant_on(&search.split.all(), &both, best);
+        is_shared.then(|| (in_words(own.id, other), both))
+    };
+    let mut found: Vec<(String, Scored)> = others.iter().take(MOST_PAIRS).filter_map(with).collect();
+    found.sort_by(|a, b| a.1.total().total_cmp(&b.1.total()));
+    let Some((_, least)) = found.first().cloned() else { return Vec::new() };
+    found.retain(|(_, both)| search.is_tied(&least, both));
+    found.into_iter().map(|(set, both)| (set, both.model().clone())).collect()
 }
 
 /// Two ids in alphabetic order, with a plus sign.
