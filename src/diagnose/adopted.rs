@@ -68,7 +68,7 @@ fn weighed(
     let without_it = search.screened(&without, responses, Some(index));
     let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
     let mut pairs = pairs_in_place(search, best, (&without, &without_it), index, &tied_with);
-    pairs.extend(shared(search, best, (screened, responses), index));
+    pairs.extend(shared(search, best, (screened, responses), index, &tied_with));
     let (sets, pairs): (Vec<String>, Vec<Model>) = pairs.into_iter().unzip();
     tied_with.extend(sets);
     tie_unstable(standing.stability, &mut tied_with, &standing.instead);

@@ -100,7 +100,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
     };
     // What a name leaves, and what a cause takes, is no fault of the bench.
     search.estimator.held_spread = Some(causes.best.model().spread);
-    name_causes(search, &mut causes)?;
+    name_causes(search, &mut causes, calibrated.model().resolution)?;
 
     (search.progress)("the final refit");
     let mut best = search.fitted(&Model { fine: true, ..causes.best.model().clone() })?;
@@ -131,7 +131,7 @@ fn has_free_forms(search: &Search, scored: &Scored) -> bool {
 }
 
 /// Puts names in the stead of free forms where they stand.
-fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseError> {
+fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Result<(), DiagnoseError> {
     if !has_free_forms(search, &causes.best) {
         return Ok(());
     }
@@ -142,7 +142,7 @@ fn name_causes(search: &mut Search, causes: &mut Causes) -> Result<(), DiagnoseE
     causes.best = search.backward(best)?;
     let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
     if ids(causes.best.model()) != ids(&before) {
-        (causes.best, causes.replaced) = replace(search, causes.best.clone())?;
+        (causes.best, causes.replaced) = replace(search, causes.best.clone(), resolution)?;
     }
     causes.coarse_total = causes.best.total();
     Ok(())
@@ -182,8 +182,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.backward(best)?;
     }
 
-    best = constants_for_discretisation(search, best, calibrated.model().resolution)?;
-    let (mut best, replaced) = replace(search, best)?;
+    let (mut best, replaced) = replace(search, best, calibrated.model().resolution)?;
     let faults_come_last = search.estimator.held_spread.take().is_some();
     if search.measure_noise(&best)? || faults_come_last {
         best = search.settle(best)?;
@@ -194,23 +193,25 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
 
 /// The model with free constants at the `resolution` that the search began with, if it costs less: another discretisation shifts the resonances as a
 /// stiffness does, and may stand for one that was not looked for yet when it was chosen.
-fn constants_for_discretisation(search: &Search, best: Scored, resolution: f64) -> Result<Scored, DiagnoseError> {
+fn constants_for_discretisation(search: &Search, best: Scored, resolution: f64) -> Scored {
     if best.model().resolution == resolution || search.above(&best) < LEAST_GAIN {
-        return Ok(best);
+        return best;
     }
     (search.progress)("constants in the place of the discretisation");
-    let other = search.fitted(&Model { resolution, ..search.with_constants(best.model()) });
+    let other = search.ranked(&Model { resolution, ..search.with_constants(best.model()) });
     // Constants that nothing needs are none.
     let other = other.and_then(|other| search.backward(search.resolve(other, Convergence::Rank)));
-    Ok(other.ok().filter(|other| search.cost(other) < search.cost(&best)).unwrap_or(best))
+    other.ok().filter(|other| search.cost(other) < search.cost(&best)).unwrap_or(best)
 }
 
-/// Replaces causes by others that leave less, or that need fewer parameters and leave hardly more: the model, and the replacements of its causes.
-fn replace(search: &mut Search, mut best: Scored) -> Result<(Scored, Vec<(usize, Trial)>), DiagnoseError> {
+/// Replaces causes by others that leave less, or that need fewer parameters and leave hardly more, and the discretisation by constants at the `resolution` that the
+/// search began with: the model, and the replacements of its causes.
+fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored, Vec<(usize, Trial)>), DiagnoseError> {
     // A model at the edge of what can be simulated has no derivatives to compare others by.
     let replacements = |search: &Search, best: &Scored| {
         if best.model().terms.is_empty() { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
     };
+    let mut best = constants_for_discretisation(search, best, resolution);
     let mut replaced = replacements(search, &best);
     for _ in 0..MOST_REPLACED {
         let better = replaced
@@ -222,6 +223,7 @@ fn replace(search: &mut Search, mut best: Scored) -> Result<(Scored, Vec<(usize,
         best = search.backward(best)?;
         // A cause in a constant's place lets the constant stay free beside it.
         best = search.with_significant_constants(best)?;
+        best = constants_for_discretisation(search, best, resolution);
         replaced = replacements(search, &best);
     }
     Ok((best, replaced))

@@ -1,7 +1,7 @@
 //! Ties: other causes, or two others together, that explain the data as well as an adopted one.
 
 use super::fit::coordinates;
-use super::plant::{Model, Term};
+use super::plant::{Candidate, Model, Term};
 use super::search::{LEAST_BIC, Responses, Scored, Screened, Search, Trial};
 
 /// Replacements are refitted like the best model if their χ² exceeds its own by no more than this.
@@ -116,7 +116,8 @@ pub(super) fn pairs_in_place(
     }
     let sets = search.sets(without.model(), screened, 2, is_wanted);
     let promising = sets.iter().take_while(|(gain, _)| *gain > PROMISING_PAIR * taken).take(MOST_PAIRS);
-    let tied = promising.filter_map(|(_, pair)| {
+    // Others are as good only if the best one is.
+    let tied = promising.map_while(|(_, pair)| {
         (search.progress)(&format!("two causes in the place of {}", own.id));
         let [.., first, second] = &pair.terms[..] else { return None };
         let set = in_words(search.id(first.candidate), search.id(second.candidate));
@@ -138,8 +139,14 @@ fn beside_plain_law(search: &Search, best: &Scored, plain: &Model, own: &str, is
 }
 
 /// A cause with another one beside it that does much of its work: the other one lowers χ² beyond chance, if not by as much as is worth a cause, and moves the
-/// first parameter of term `index` of `best` by [`LEAST_MOVED`]. The best such set, and those that the data cannot tell from it.
-pub(super) fn shared(search: &Search, best: &Scored, (screened, responses): (&Screened, &Responses), index: usize) -> Vec<Pair> {
+/// first parameter of term `index` of `best` by [`LEAST_MOVED`]. The best such set, and those that the data cannot tell from it; none of causes that are `tied` alone.
+pub(super) fn shared(
+    search: &Search,
+    best: &Scored,
+    (screened, responses): (&Screened, &Responses),
+    index: usize,
+    tied: &[String],
+) -> Vec<Pair> {
     let own = search.candidate(&best.model().terms[index]);
     let with_off = own.parameters.iter().enumerate().find_map(|(k, free)| Some((k, free.off?)));
     let Some((at, off)) = with_off.filter(|_| !own.is_free_form) else { return Vec::new() };
@@ -148,10 +155,13 @@ pub(super) fn shared(search: &Search, best: &Scored, (screened, responses): (&Sc
         let x = model.terms[index].x[at];
         (x - best.model().terms[index].x[at]).abs() / (best.model().terms[index].x[at] - off).abs().max(f64::MIN_POSITIVE)
     };
-    let is_law = |term: &Term| !search.candidate(term).is_free_form && !search.candidate(term).is_variant;
+    let is_wanted = |term: &Term| {
+        let Candidate { id, is_free_form, is_variant, .. } = search.candidate(term);
+        !(*is_free_form || *is_variant || *id == own.id || tied.iter().any(|tied| tied == id))
+    };
     // The model with another cause beside this one, the linear estimate of its gain, and whether it does nearly what this one does.
     let promising = |(gain, model): &(f64, Model)| {
-        let term = model.terms.last().filter(|term| is_law(term) && search.id(term.candidate) != own.id)?;
+        let term = model.terms.last().filter(|term| is_wanted(term))?;
         let mut with = best.model().clone();
         with.terms[index].x[at] += responses.shift(term, coordinate, search)?;
         let is_alike = responses.is_alike(term, coordinate);
@@ -170,7 +180,7 @@ pub(super) fn shared(search: &Search, best: &Scored, (screened, responses): (&Sc
         let is_shared = moved(both.model()) > LEAST_MOVED && search.is_significant_on(&search.split.all(), &both, best);
         is_shared.then(|| (in_words(own.id, other), both))
     };
-    let mut found: Vec<(String, Scored)> = others.iter().take(MOST_PAIRS).filter_map(with).collect();
+    let mut found: Vec<(String, Scored)> = others.iter().take(MOST_PAIRS).map_while(with).collect();
     found.sort_by(|a, b| a.1.total().total_cmp(&b.1.total()));
     let Some((_, least)) = found.first().cloned() else { return Vec::new() };
     found.retain(|(_, both)| search.is_tied(&least, both));
