@@ -277,4 +277,21 @@ mod tests {
             assert_eq!(search.forward(calibrated).unwrap().0.model().terms.len(), count);
         }
     }
+
+    #[test]
+    fn constants_take_the_place_of_a_discretisation_that_stands_for_them_in_part() {
+        // A resolution of 2 does what an amplitude of 1 does.
+        for (hidden, resolution) in [(3.0, 1.0), (1.0, 2.0)] {
+            let mut plant = Waves::new(&[("other", hidden)]);
+            plant.candidates[0].is_constant = true;
+            plant.resolutions = vec![1.0, 2.0];
+            let search = search(&plant);
+            let best = search.fitted(&Model::new(Vec::new(), 2.0, false)).unwrap();
+            let found = constants_for_discretisation(&search, best, 1.0);
+            let model = found.model();
+            let amplitude = model.terms.iter().map(|term| term.x[0]).sum::<f64>() + model.resolution - 1.0;
+            assert!((amplitude - hidden).abs() < 0.1, "{amplitude}");
+            assert_eq!(model.resolution, resolution, "{hidden}");
+        }
+    }
 }

@@ -11,6 +11,8 @@ use super::split::split;
 pub(super) struct Waves {
     signals: Vec<Signal>,
     pub(super) candidates: Vec<Candidate>,
+    /// Above 1 they add the wave `other` with an amplitude of what they exceed 1 by.
+    pub(super) resolutions: Vec<f64>,
 }
 
 const VALUES: usize = 400;
@@ -64,7 +66,7 @@ impl Waves {
         variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
         variant.starts = vec![vec![1.0, 1.0]];
         candidates.push(variant);
-        Self { signals: (0..6).map(signal).collect(), candidates }
+        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0] }
     }
 }
 
@@ -90,7 +92,13 @@ impl Plant for Waves {
             let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
             term.x[0] * wave(self.candidates[term.candidate].id, run, at) + more
         };
-        Ok((0..VALUES).map(|at| model.terms.iter().map(|term| of(term, at)).sum()).collect())
+        let finer = model.resolution - 1.0;
+        let value = |at| model.terms.iter().map(|term| of(term, at)).sum::<f64>() + finer * wave("other", run, at);
+        Ok((0..VALUES).map(value).collect())
+    }
+
+    fn resolutions(&self) -> Vec<f64> {
+        self.resolutions.clone()
     }
 }
 
