@@ -688,63 +688,74 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn fit_nuisances(&mut self, model: &Model, runs: &[usize]) -> Result<(), DiagnoseError> {
-        const STEP: f64 = 0.05;
-        for &run in runs {
-            for _ in 0..3 {
-                let nuisance = self.nuisance(model, run);
-                let with = |shares: Vec<f64>| self.residuals_with(model, run, &Nuisance { shares, ..nuisance.clone() });
-                let shares = nuisance.shares.clone();
-                if shares.is_empty() {
-                    break;
-                }
-                let shifted = |k: usize| {
-                    let step = if shares[k] > 0.5 { -STEP } else { STEP };
-                    let mut shifted = shares.clone();
-                    shifted[k] += step;
-                    (shifted, step)
-                };
-                let plain = self.residuals(model, run)?;
-                let columns: Vec<Residuals> = (0..shares.len())
-                    .into_par_iter()
-                    .map(|k| {
-                        let (moved, step) = shifted(k);
-                        let r = with(moved)?;
-                        Ok(r.iter().zip(&plain).map(|(a, b)| (a - b) / step).collect())
-                    })
-                    .collect::<Result<_, DiagnoseError>>()?;
-                let n = shares.len();
-                let gradient: Vec<f64> = columns.iter().map(|column| inner(column, &plain)).collect();
-                let held: Vec<bool> =
-                    (0..n).map(|k| (shares[k] >= 1.0 && gradient[k] < 0.0) || (shares[k] <= 0.0 && gradient[k] > 0.0)).collect();
-                let matrix = DMatrix::from_fn(n, n, |i, j| {
-                    if i == j {
-                        1e-9 + inner(&columns[i], &columns[i])
-                    } else if held[i] || held[j] {
-                        0.0
-                    } else {
-                        inner(&columns[i], &columns[j])
-                    }
-                });
-                let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
-                let Some(step) = matrix.lu().solve(&right) else { break };
-                let before = sum_of_squares(&plain);
-                let mut better = None;
-                for part in [1.0, 0.3, 0.1] {
-                    let trial: Vec<f64> = shares.iter().zip(step.iter()).map(|(x, by)| (x + part * by).clamp(0.0, 1.0)).collect();
-                    let chi2 = sum_of_squares(&with(trial.clone())?);
-                    if chi2 < before {
-                        better = Some((trial, chi2));
-                        break;
-                    }
-                }
-                let Some((trial, chi2)) = better else { break };
-                self.nuisances[run].shares = trial;
-                if before - chi2 < 1.0 {
+        let fitted: Vec<Vec<f64>> = runs.par_iter().map(|run| self.fitted_shares(model, *run)).collect::<Result<_, _>>()?;
+        for (run, shares) in runs.iter().zip(fitted) {
+            self.nuisances[*run].shares = shares;
+        }
+        Ok(())
+    }
+
+    /// The shares of a run that fit it best, by some steps of Gauss and Newton.
+    fn fitted_shares(&self, model: &Model, run: usize) -> Result<Vec<f64>, DiagnoseError> {
+        const MOST_STEPS: usize = 3;
+        /// Steps end where they lower χ² by less.
+        const LEAST_FALL: f64 = 1.0;
+        let mut nuisance = self.nuisance(model, run);
+        if nuisance.shares.is_empty() {
+            return Ok(nuisance.shares);
+        }
+        let mut residuals = self.residuals_with(model, run, &nuisance)?;
+        for _ in 0..MOST_STEPS {
+            let before = sum_of_squares(&residuals);
+            let step = self.step_of_shares(model, run, &nuisance, &residuals)?;
+            let mut better = None;
+            for part in [1.0, 0.3, 0.1] {
+                let moved = nuisance.shares.iter().zip(step.iter()).map(|(x, by)| (x + part * by).clamp(0.0, 1.0));
+                let trial = Nuisance { shares: moved.collect(), ..nuisance.clone() };
+                let of_trial = self.residuals_with(model, run, &trial)?;
+                if sum_of_squares(&of_trial) < before {
+                    better = Some((trial, of_trial));
                     break;
                 }
             }
+            let Some((trial, of_trial)) = better else { break };
+            (nuisance, residuals) = (trial, of_trial);
+            if before - sum_of_squares(&residuals) < LEAST_FALL {
+                break;
+            }
         }
-        Ok(())
+        Ok(nuisance.shares)
+    }
+
+    /// The step of Gauss and Newton of a run's shares, from derivatives by differences; 0 for those at a bound that it would leave, and for all where it is singular.
+    fn step_of_shares(
+        &self,
+        model: &Model,
+        run: usize,
+        nuisance: &Nuisance,
+        residuals: &Residuals,
+    ) -> Result<DVector<f64>, DiagnoseError> {
+        const STEP: f64 = 0.05;
+        let shares = &nuisance.shares;
+        let n = shares.len();
+        let column = |k: usize| -> Result<Residuals, DiagnoseError> {
+            let step = if shares[k] > 0.5 { -STEP } else { STEP };
+            let mut moved = nuisance.clone();
+            moved.shares[k] += step;
+            let moved = self.residuals_with(model, run, &moved)?;
+            Ok(moved.iter().zip(residuals).map(|(a, b)| (a - b) / step).collect())
+        };
+        let columns: Vec<Residuals> = (0..n).into_par_iter().map(column).collect::<Result<_, _>>()?;
+        let gradient: Vec<f64> = columns.iter().map(|column| inner(column, residuals)).collect();
+        let is_held = |k: usize| (shares[k] >= 1.0 && gradient[k] < 0.0) || (shares[k] <= 0.0 && gradient[k] > 0.0);
+        let held: Vec<bool> = (0..n).map(is_held).collect();
+        let matrix = DMatrix::from_fn(n, n, |i, j| match () {
+            () if i == j => 1e-9 + inner(&columns[i], &columns[i]),
+            () if held[i] || held[j] => 0.0,
+            () => inner(&columns[i], &columns[j]),
+        });
+        let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
+        Ok(matrix.lu().solve(&right).unwrap_or_else(|| DVector::zeros(n)))
     }
 }
 
