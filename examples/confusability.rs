@@ -22,7 +22,7 @@ mod ground;
 #[path = "../tests/hidden/judge.rs"]
 mod judge;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use generator::{Case, DRIFTING_GAIN, INSIDE, OUTSIDE, cases};
@@ -185,11 +185,16 @@ fn are_named(d: &Diagnosis, effects: &[String]) -> bool {
     !effects.is_empty() && cases::named(effects).into_iter().all(is_named)
 }
 
-/// True if the causes beside minor ones are the hidden ones or tied with them, and no others.
+/// True if the causes beside minor ones are the hidden ones and no others, each as it is named or as one of those, or of the sets, that it is tied with.
 fn are_all(d: &Diagnosis, effects: &[String]) -> bool {
-    let (hidden, found) = (cases::named(effects), physics(d));
-    hidden.iter().all(|id| found.iter().any(|effect| is_of(effect, id)))
-        && found.iter().all(|effect| hidden.iter().any(|id| is_of(effect, id)))
+    let hidden: BTreeSet<&str> = cases::named(effects).into_iter().collect();
+    let mut together = vec![BTreeSet::new()];
+    for effect in physics(d) {
+        let of_effect = std::iter::once(&effect.id).chain(&effect.tied_with).map(|set| set.split('+'));
+        let of_effect: Vec<BTreeSet<&str>> = of_effect.map(Iterator::collect).filter(|set| hidden.is_superset(set)).collect();
+        together = together.iter().flat_map(|others| of_effect.iter().map(move |set| others | set)).collect();
+    }
+    together.contains(&hidden)
 }
 
 /// Nothing where nothing is hidden, a fault of the bench as such, `unexplained` or the right name of what is in no library, and otherwise every hidden cause by name, and
