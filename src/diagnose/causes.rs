@@ -182,7 +182,8 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.backward(best)?;
     }
 
-    let (mut best, replaced) = replace(search, best, calibrated.model().resolution)?;
+    let (mut best, replaced) =
+        if is_insufficient { (best, Vec::new()) } else { replace(search, best, calibrated.model().resolution)? };
     let faults_come_last = search.estimator.held_spread.take().is_some();
     if search.measure_noise(&best)? || faults_come_last {
         best = search.settle(best)?;
