@@ -180,6 +180,21 @@ fn the_command_exports_and_runs_a_file_and_refuses_a_bad_one() {
     assert!(read.status.success(), "{}", String::from_utf8_lossy(&read.stderr));
     assert_eq!(plain.stdout, read.stdout);
 
+    // Effects stand in the file once: they are not applied to it again.
+    let text_of_effects = "\n[[effect]]\nid = \"areal-mass\"\nscale = 1.1\n";
+    fs::write(
+        folder.path().join("b.toml"),
+        experiment::presets::find("cantilever-dc").unwrap().text.to_owned() + text_of_effects,
+    )
+    .unwrap();
+    assert!(run(&["urdf", "b.toml", "--out", "b.urdf"]).status.success());
+    let heavier = run(&[&["run", "b.toml"], &short[..]].concat());
+    let read = run(&[&["run", "b.toml", "--robot", "b.urdf"], &short[..]].concat());
+    assert_ne!(heavier.stdout, plain.stdout);
+    assert_eq!(heavier.stdout, read.stdout);
+    let message = String::from_utf8_lossy(&read.stderr).into_owned();
+    assert!(message.contains("warning: the links' masses are those of the robot's file"), "{message}");
+
     fs::write(folder.path().join("bad.urdf"), text.replace("continuous", "fixed")).unwrap();
     let bad = run(&["run", "a.toml", "--robot", "bad.urdf", "--out", "b.npz"]);
     let message = String::from_utf8_lossy(&bad.stderr).into_owned();

@@ -22,6 +22,7 @@ use super::summary::{Findings, failing, summary};
 use super::ties::Ties;
 use super::unseen::Unseen;
 use super::verdict::{Judged, LEFT_OVER, doubtful, insufficient_data, judge};
+use crate::number::significant;
 
 /// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
 const SEARCH_RESOLUTION: f64 = 10.0;
@@ -225,7 +226,14 @@ impl Report<'_, '_> {
         let noise = &search.estimator.noise;
         let bench = faults::found(&search.estimator, best.model())?;
         quality.extend(faults::remarks(&bench.faults, noise, search.estimator.plant));
-        let [baseline, calibrated, extended] = self.stages()?;
+        let tuned = Unseen::of(search, self.calibrated, &[], &[])?;
+        let is_no_better = !is_nothing(&effects) && self.unseen.is_clearly_worse_than(&tuned, search);
+        let [baseline, calibrated, extended] = self.stages(&tuned)?;
+        let unit = search.estimator.plant.unit();
+        let unseen = is_no_better.then(|| {
+            let [own, tuned] = [&extended, &calibrated].map(|stage| format!("{} {unit}", significant(stage.rmse_heldout_mm, 2)));
+            format!("it predicts runs that were left out worse than re-tuned constants do (rms error {own} against {tuned})")
+        });
         let failed = failing(&extended.residual_tests);
         let combinations = combinations(search, best, &self.ties.terms())?;
         let judged_by = Unseen::by(search);
@@ -239,6 +247,7 @@ impl Report<'_, '_> {
             resolution: best.model().resolution,
             refined: judged.refined,
             failing: failed.as_deref(),
+            unseen: unseen.as_deref(),
             judged_by,
             runs: search.split.all().len(),
         };
@@ -247,7 +256,7 @@ impl Report<'_, '_> {
             schema: 2,
             dataset: String::new(),
             verdict,
-            complete: verdict != Verdict::Unexplained && failed.is_none() && !has_rest,
+            complete: verdict != Verdict::Unexplained && failed.is_none() && unseen.is_none() && !has_rest,
             summary: summary(verdict, &findings),
             // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
             unexplained_fraction: if is_open { *unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },
@@ -275,14 +284,13 @@ impl Report<'_, '_> {
         })
     }
 
-    /// The nominal, the re-tuned and the extended model beside the data.
-    fn stages(&self) -> Result<[Stage; 3], DiagnoseError> {
+    /// The nominal, the re-tuned (on the runs that judge it: `tuned`) and the extended model beside the data.
+    fn stages(&self, tuned: &Unseen) -> Result<[Stage; 3], DiagnoseError> {
         let Self { search, judged, nominal, calibrated, .. } = self;
         let constants = intervals_of(search, calibrated, &[])?;
-        let of_runs = |scored: &Scored| Unseen::of(search, scored, &[], &[]);
         Ok([
-            self.stage(nominal, &of_runs(nominal)?, Vec::new()),
-            self.stage(calibrated, &of_runs(calibrated)?, self.parameters(calibrated, &constants)),
+            self.stage(nominal, &Unseen::of(search, nominal, &[], &[])?, Vec::new()),
+            self.stage(calibrated, tuned, self.parameters(calibrated, &constants)),
             self.stage(&judged.best, &self.unseen, self.parameters(&judged.best, &judged.intervals)),
         ])
     }

@@ -771,11 +771,13 @@ impl Search<'_> {
                 (self.progress)(&format!("doing without {}", self.id(best.model().terms[index].candidate)));
                 self.ranked(&self.without(&best, index)?)
             };
-            // First those within the error of the discretisation.
+            // First those within the error of the discretisation, which are no causes but may be needed.
             let plant = self.estimator.plant;
-            let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
-            if let Some(idle) = idle {
-                best = self.fitted(shorter(idle)?.model())?;
+            let is_idle = |index: &usize| !plant.is_credible(&best.model().terms[*index], best.model().resolution);
+            let idle = (0..best.model().terms.len()).filter(is_idle);
+            let mut without = idle.filter_map(|index| self.fitted(shorter(index).ok()?.model()).ok());
+            if let Some(less) = without.find(|less| !self.is_needed(&best, less)) {
+                best = less;
                 continue;
             }
             // A term without which the model diverges is needed.

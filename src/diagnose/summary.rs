@@ -69,6 +69,8 @@ pub(super) struct Findings<'a> {
     pub(super) refined: bool,
     /// The result of [`failing`] for the extended model.
     pub(super) failing: Option<&'a str>,
+    /// How the extended model predicts runs that were left out, if worse than re-tuned constants do.
+    pub(super) unseen: Option<&'a str>,
     /// What judges the models.
     pub(super) judged_by: JudgedBy,
     /// Number of runs.
@@ -86,10 +88,22 @@ fn with_few_runs(main: String, findings: &Findings) -> String {
 
 /// The verdict in a sentence.
 pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
-    let Findings { effects, combinations, place_in_words, left, has_rest, insufficient, resolution, refined, failing, .. } =
-        *findings;
+    let Findings {
+        effects,
+        combinations,
+        place_in_words,
+        left,
+        has_rest,
+        insufficient,
+        resolution,
+        refined,
+        failing,
+        unseen,
+        ..
+    } = *findings;
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
-    let but = failing.map_or_else(String::new, |failing| format!(", but {failing}"));
+    let but: Vec<&str> = unseen.into_iter().chain(failing).collect();
+    let but = if but.is_empty() { String::new() } else { format!(", but {}", but.join("; ")) };
     let name = |effect: &Adopted| {
         if effect.curve.is_some() {
             return located(effect, place_in_words);
@@ -161,6 +175,7 @@ mod tests {
         resolution: 3.0,
         refined: false,
         failing: None,
+        unseen: None,
         judged_by: JudgedBy::JudgeRuns,
         runs: 11,
     };
@@ -184,6 +199,13 @@ mod tests {
         assert_eq!(failing(&tests(80, 2)), None);
         assert!(failing(&tests(80, 3)).is_some() && failing(&tests(5, 2)).is_some());
         assert!(failing(&tests(1000, 3)).is_none());
+    }
+
+    #[test]
+    fn a_model_that_predicts_worse_than_constants_says_so_first() {
+        let found =
+            summary(Verdict::Named, &Findings { unseen: Some("it predicts worse"), failing: Some("two tests fail"), ..NOTHING });
+        assert!(found.contains(", but it predicts worse; two tests fail"), "{found}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::DiagnoseError;
 use super::diagnosis::JudgedBy;
 use super::fit::{Convergence, Residuals, sum_of_squares};
 use super::plant::Model;
-use super::search::{Scored, Search};
+use super::search::{Scored, Search, VISIBLE};
 
 /// Residuals of a model on the runs that judge it.
 pub(super) struct Unseen {
@@ -80,6 +80,11 @@ impl Unseen {
     /// True if this model leaves more than another one.
     pub(super) fn is_worse_than(&self, other: &Self) -> bool {
         self.chi2 > other.chi2
+    }
+
+    /// True if this model leaves more than another one by more than half the noise, in χ² per value.
+    pub(super) fn is_clearly_worse_than(&self, other: &Self, search: &Search) -> bool {
+        self.chi2 > other.chi2 + VISIBLE * search.estimator.count(&self.runs) as f64
     }
 
     /// Share of χ² above the noise that this model removes from another one's (0 to 1).
@@ -157,6 +162,20 @@ mod tests {
 
     fn search<'a>(plant: &'a Means, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
         Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY, is_by_names: false }
+    }
+
+    #[test]
+    fn a_model_that_follows_one_run_is_clearly_worse_than_none() {
+        // Without run k the mean of the others is 15, 15 and 0, which leaves 15² + 15² + 30² where none leaves 30²; of the second runs the mean of two leaves as
+        // much as none, to within half the noise.
+        for (means, is_worse) in [([0.0, 0.0, 30.0], true), ([0.0, 0.0, 0.3], false)] {
+            let plant = plant(&means);
+            let search = search(&plant, Split { fit: vec![0, 1], select: vec![2], judge: vec![] }, &|_| {});
+            let of = |terms| Unseen::of(&search, &search.fitted(&Model::new(terms, 1.0, false)).unwrap(), &[], &[]).unwrap();
+            let (mean, none) = (of(vec![Term { candidate: 0, x: vec![1.0] }]), of(Vec::new()));
+            assert!(mean.is_worse_than(&none));
+            assert_eq!(mean.is_clearly_worse_than(&none, &search), is_worse, "{means:?}");
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::analytic;
 use crate::drive::{Drive, Means, Waveform};
 use crate::effects::View;
 use crate::engine::{ClampHits, EnergyAudit, EnergyBalance, Engine, EngineError};
+use crate::model::{Extensions, Robot};
 use crate::recording::Recording;
 use crate::recording::accumulator::{MeasureAccumulator, SamplingPlan};
 use crate::recording::measures::{Measures, recorded_jump_height};
@@ -88,8 +89,24 @@ impl Run {
     /// What is to be known of measures that are given: nothing that [`trouble`](Self::trouble) says.
     pub fn warnings(&self, experiment: &Experiment) -> Vec<String> {
         let bending = |times| self.bending.beyond(&experiment.robot, times);
-        if bending(CLEARLY).is_none() { bending(1.0).into_iter().collect() } else { Vec::new() }
+        let bent = if bending(CLEARLY).is_none() { bending(1.0) } else { None };
+        bent.into_iter().chain(not_applied(&experiment.robot)).collect()
     }
+}
+
+/// What is to be known of a robot whose bodies were read from a file, if effects would change them.
+fn not_applied(robot: &Robot) -> Option<String> {
+    robot.bodies.as_ref()?;
+    let Extensions { mass_scale, friction_scale, .. } = robot.extensions;
+    let what = match (mass_scale != 1.0, friction_scale != 1.0) {
+        (false, false) => return None,
+        (true, false) => "masses",
+        (false, true) => "frictions",
+        (true, true) => "masses and frictions",
+    };
+    Some(format!(
+        "the links' {what} are those of the robot's file; effects that scale them are not applied (a file written by sfers urdf holds them already)"
+    ))
 }
 
 /// [`experiment::run`](super::run) with steps of one length. Nothing is allocated inside the loop: the recording has its final size from the start.

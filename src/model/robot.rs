@@ -102,7 +102,8 @@ pub struct Robot {
     pub friction: Friction,
     /// Payloads.
     pub masses: Vec<PointMass>,
-    /// The N·m + 1 bodies, where they were read from a file instead of following from the fields above.
+    /// The N·m + 1 bodies, where they were read from a file instead of following from the fields above. They are as the file says: no factor of
+    /// [`extensions`](Self::extensions) on masses and frictions applies to them, which an exported file holds already.
     pub bodies: Option<Vec<Segment>>,
     /// What it has beyond the plain model.
     pub extensions: Extensions,
@@ -175,12 +176,10 @@ impl Robot {
     /// The N·m + 1 bodies from left to right. The first and last are half as long and heavy as the others, so that the joints
     /// stand at the middle of the pieces they represent.
     pub fn segments(&self) -> Vec<Segment> {
-        let Extensions { mass_scale, friction_scale, .. } = self.extensions;
         if let Some(bodies) = &self.bodies {
-            let scaled =
-                |body: &Segment| Segment { mass: body.mass * mass_scale, friction: body.friction * friction_scale, ..*body };
-            return bodies.iter().map(scaled).collect();
+            return bodies.clone();
         }
+        let Extensions { mass_scale, friction_scale, .. } = self.extensions;
         let m = self.motors_per_actuator as f64;
         let mass = Laminate::new(&self.material).actuator_mass;
         let count = self.joints() + 1;
