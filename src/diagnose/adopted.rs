@@ -161,7 +161,6 @@ fn effect(search: &Search, judged: &Judged, index: usize, standing: &Standing, t
     let candidate = search.candidate(term);
     // The actuator was found by trying all of them; other given parameters are the form of the equation.
     let (found_by_trying, form): (Vec<_>, Vec<_>) = candidate.fixed.iter().copied().partition(|(name, _)| *name == "actuator");
-    let is_minor = standing.is_left_by_law || !search.estimator.plant.is_credible(term, best.model().resolution);
     let which = found_by_trying.into_iter().map(|(name, value)| Estimate {
         name: name.to_owned(),
         value,
@@ -177,7 +176,7 @@ fn effect(search: &Search, judged: &Judged, index: usize, standing: &Standing, t
         parameters: which.chain(estimates(search, index, term, &judged.intervals)).collect(),
         tied_with: tied_with.to_vec(),
         share: 0.0,
-        role: if is_minor { Part::Minor } else { Part::Cause },
+        role: if standing.is_left_by_law { Part::Minor } else { Part::Cause },
         stability: standing.stability,
         curve: curve(search, best, index, &judged.intervals),
         nearest: Vec::new(),

@@ -695,6 +695,18 @@ impl<'a> Estimator<'a> {
         Ok(())
     }
 
+    /// The shares of all runs, one after the other.
+    pub fn shares(&self) -> DVector<f64> {
+        let shares: Vec<f64> = self.nuisances.iter().flat_map(|nuisance| nuisance.shares.iter().copied()).collect();
+        DVector::from_vec(shares)
+    }
+
+    /// Moves the shares of all runs by `step`, within their bounds.
+    pub fn move_shares(&mut self, step: &DVector<f64>) {
+        let shares = self.nuisances.iter_mut().flat_map(|nuisance| nuisance.shares.iter_mut());
+        shares.zip(step.iter()).for_each(|(share, by)| *share = (*share + by).clamp(0.0, 1.0));
+    }
+
     /// The shares of a run that fit it best, by some steps of Gauss and Newton.
     fn fitted_shares(&self, model: &Model, run: usize) -> Result<Vec<f64>, DiagnoseError> {
         const MOST_STEPS: usize = 3;

@@ -60,6 +60,9 @@ const ENOUGH: f64 = 0.5;
 const STILL_THERE: f64 = 0.3;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
+/// Turns are extrapolated if each goes on by at least this share of the one before, as if by no more than the other.
+const LEAST_RATIO: f64 = 0.3;
+const MOST_RATIO: f64 = 0.95;
 /// Most alternations between the spread of the bench's faults and the model.
 const MOST_SPREADS: usize = 3;
 
@@ -350,18 +353,29 @@ impl Search<'_> {
         start
     }
 
-    /// Alternates fits of nuisance parameters and model until χ² has converged.
+    /// Alternates fits of nuisance parameters and model until χ² has converged. The two may be nearly collinear, as the times of jumps and a driver's slew rate,
+    /// and each turn then comes nearer by the same small part: where two turns in a row go the same way, the sum of all further ones is added (Aitken 1926).
     ///
     /// # Errors
     /// [`DiagnoseError`] if a model cannot be simulated.
     pub fn settle(&mut self, scored: Scored) -> Result<Scored, DiagnoseError> {
         let mut scored = scored;
         let all = self.split.all();
+        let mut last: Option<DVector<f64>> = None;
         for _ in 0..MOST_TURNS {
             let before = scored.total();
             self.estimator.set_faults(scored.model())?;
+            let from = self.estimator.shares();
             self.estimator.fit_nuisances(scored.model(), &all)?;
+            let step = self.estimator.shares() - from;
             scored = self.fitted(scored.model())?;
+            let ratio = last.as_ref().map_or(0.0, |last| step.dot(last) / last.norm_squared());
+            if (LEAST_RATIO..1.0).contains(&ratio) {
+                scored = self.extrapolated(scored, &step * (ratio.min(MOST_RATIO) / (1.0 - ratio.min(MOST_RATIO))))?;
+                last = None;
+            } else {
+                last = Some(step);
+            }
             if before - scored.total()
                 < 1e-3 * (before - self.estimator.count(&all) as f64).max(self.estimator.count(&all) as f64)
             {
@@ -369,6 +383,19 @@ impl Search<'_> {
             }
         }
         Ok(scored)
+    }
+
+    /// The model with the shares of all runs moved by `step`, if that leaves less.
+    fn extrapolated(&mut self, scored: Scored, step: DVector<f64>) -> Result<Scored, DiagnoseError> {
+        let before = self.estimator.state();
+        self.estimator.move_shares(&step);
+        match self.fitted(scored.model()) {
+            Ok(moved) if moved.total() < scored.total() => Ok(moved),
+            _ => {
+                self.estimator.restore(before);
+                Ok(scored)
+            }
+        }
     }
 
     /// Δχ² of `worse` over `better` on `runs`: in standard errors, and as it is.
@@ -771,13 +798,11 @@ impl Search<'_> {
                 (self.progress)(&format!("doing without {}", self.id(best.model().terms[index].candidate)));
                 self.ranked(&self.without(&best, index)?)
             };
-            // First those within the error of the discretisation, which are no causes but may be needed.
+            // First those within the error of the discretisation.
             let plant = self.estimator.plant;
-            let is_idle = |index: &usize| !plant.is_credible(&best.model().terms[*index], best.model().resolution);
-            let idle = (0..best.model().terms.len()).filter(is_idle);
-            let mut without = idle.filter_map(|index| self.fitted(shorter(index).ok()?.model()).ok());
-            if let Some(less) = without.find(|less| !self.is_needed(&best, less)) {
-                best = less;
+            let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
+            if let Some(idle) = idle {
+                best = self.fitted(shorter(idle)?.model())?;
                 continue;
             }
             // A term without which the model diverges is needed.
