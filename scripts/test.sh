@@ -24,6 +24,8 @@ step() { printf '\n== %s (after %d s)\n' "$*" "$SECONDS"; }
 step "tests"
 # A missing tool is an error here, not a skipped test.
 export SFERS_REQUIRE_TOOLS=1 SFERS_FUZZ_INPUTS=20000
+# No test reads line tables, which take minutes to write; the instructions are the same.
+export CARGO_PROFILE_RELEASE_DEBUG=none
 # The two left out are no tests: a worker of the fuzz tests, and the repetition of one input.
 cargo test --release --locked --workspace -- --include-ignored --skip worker_process --skip one_case
 
