@@ -7,9 +7,8 @@
 //! The nuisance parameters of a run ([`Plant::nuisances`]), such as times of jumps between rows, are fitted run by run, in turn with the model's
 //! parameters. Every sum has a fixed order, so results do not depend on the number of threads.
 
-use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -17,6 +16,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Columns, Spread};
 use super::blocks::blocks;
+use super::kept::Kept;
 use super::noise::Noise;
 use super::plant::{Model, Nuisance, Plant};
 
@@ -44,9 +44,6 @@ const STUDENT_95: [f64; 12] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365,
 pub(super) fn student_95(freedom: usize) -> f64 {
     STUDENT_95[freedom.saturating_sub(1).min(STUDENT_95.len() - 1)]
 }
-
-/// Predicted values in each of the cache's two generations.
-const MOST_KEPT: usize = 2_000_000;
 
 /// Convergence of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,7 +136,7 @@ pub struct Estimator<'a> {
     faults: Vec<Columns>,
     /// The noise that residuals are whitened for.
     pub noise: Noise,
-    kept: Mutex<Kept>,
+    kept: Kept,
 }
 
 /// What an [`Estimator`] has found out of the data beside the model.
@@ -149,30 +146,6 @@ pub struct State {
     used: Vec<Vec<bool>>,
     faults: Vec<Columns>,
     noise: Noise,
-}
-
-/// Cache of predictions in two generations. Fits begin where others ended, so one prediction in five is repeated.
-#[derive(Default)]
-struct Kept {
-    recent: HashMap<Vec<u64>, Arc<Vec<f64>>>,
-    older: HashMap<Vec<u64>, Arc<Vec<f64>>>,
-    /// Number of values in `recent`.
-    values: usize,
-}
-
-impl Kept {
-    fn get(&self, key: &[u64]) -> Option<Arc<Vec<f64>>> {
-        self.recent.get(key).or_else(|| self.older.get(key)).cloned()
-    }
-
-    fn put(&mut self, key: Vec<u64>, predicted: &Arc<Vec<f64>>) {
-        if self.values > MOST_KEPT {
-            self.older = std::mem::take(&mut self.recent);
-            self.values = 0;
-        }
-        self.values += predicted.len();
-        self.recent.insert(key, predicted.clone());
-    }
 }
 
 /// The bits of all that a prediction depends on.
@@ -207,20 +180,12 @@ impl<'a> Estimator<'a> {
             is_calibrated: false,
             faults: Vec::new(),
             noise: Noise::default(),
-            kept: Mutex::default(),
+            kept: Kept::default(),
         }
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Arc<Vec<f64>>, DiagnoseError> {
-        let key = key(model, run, nuisance);
-        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = kept().get(&key);
-        if let Some(known) = known {
-            return Ok(known);
-        }
-        let predicted = Arc::new(self.plant.predict(model, run, nuisance)?);
-        kept().put(key, &predicted);
-        Ok(predicted)
+        self.kept.get_or(key(model, run, nuisance), || self.plant.predict(model, run, nuisance))
     }
 
     /// Residuals of a run, in σ.

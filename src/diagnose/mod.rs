@@ -29,6 +29,7 @@ pub mod fit;
 mod forward;
 pub mod identify;
 mod intervals;
+mod kept;
 pub mod names;
 mod naming;
 pub mod noise;

@@ -6,6 +6,7 @@ use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
 use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
+use super::kept::Kept;
 use super::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal, Term};
 use super::quality;
 use super::response::Sine;
@@ -14,7 +15,7 @@ use super::visited::{Visit, Visited, visited};
 use super::voltage::Command;
 use crate::analytic;
 use crate::drive::{Drive, Table, Waveform};
-use crate::effects::{self, Applied, EffectError, Kind, SignalChain, View};
+use crate::effects::{self, Action, Applied, EffectError, Kind, SignalChain, View};
 use crate::model::{Mount, PointMass, Robot};
 
 /// Joints per actuator that are tried; more change a cantilever's first frequency by less than 0.06 %.
@@ -60,6 +61,8 @@ struct Run {
     start: Start,
     /// Time at which it starts (s).
     origin: f64,
+    /// Times (s) of the rows that count, ascending, which all channels share.
+    times: Vec<f64>,
     /// Time from there to its last row (s).
     duration: f64,
     /// Time step (s).
@@ -86,6 +89,8 @@ pub struct RobotPlant {
     exposure: f64,
     /// True if there is no voltage in any run.
     without_voltage: bool,
+    /// Positions as a camera without errors sees them.
+    seen: Kept,
 }
 
 impl RobotPlant {
@@ -127,8 +132,12 @@ impl RobotPlant {
                 }
                 longest = longest.min(1.0 / (ROWS_PER_PERIOD * frequencies[frequencies.len() - 1]));
             }
+            let mut counted = signal.times.clone();
+            counted.sort_by(f64::total_cmp);
+            counted.dedup();
             signals.push(signal);
             runs.push(Run {
+                times: counted,
                 step: longest,
                 robot,
                 markers: run.positions.clone(),
@@ -157,6 +166,7 @@ impl RobotPlant {
             bench: dataset.bench,
             exposure: 1e-3 * dataset.camera.exposure_ms.unwrap_or(0.0),
             without_voltage,
+            seen: Kept::default(),
         };
         plant.with_chosen_steps().with_candidates()
     }
@@ -416,6 +426,14 @@ impl Plant for RobotPlant {
     }
 }
 
+/// The bits of all that the motion of a run depends on, and the times at which it is seen.
+fn motion_key<'t>(terms: impl Iterator<Item = &'t Term>, numbers: [f64; 3], run: usize, nuisance: &Nuisance) -> Vec<u64> {
+    let of_term =
+        |term: &'t Term| [term.candidate as u64, term.x.len() as u64].into_iter().chain(term.x.iter().map(|x| x.to_bits()));
+    let nuisance = nuisance.shares.iter().chain(&nuisance.base).chain(&numbers).map(|x| x.to_bits());
+    std::iter::once(run as u64).chain(nuisance).chain(terms.flat_map(of_term)).collect()
+}
+
 /// A model made ready to run.
 struct Setup {
     robot: Robot,
@@ -442,23 +460,44 @@ impl RobotPlant {
         nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let Run { robot, markers, command, start, response, has_clock, .. } = &self.runs[run];
+        let Run { response, times, markers, .. } = &self.runs[run];
         let effects = terms.iter().map(|term| self.applied_in(term, run)).collect::<Result<Vec<_>, _>>()?;
         if let Some(response) = response {
             return self.respond(response, &self.runs[run], &effects, resolution, nuisance, step);
         }
-        let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
-        let Setup { robot, drive, chain, view } =
-            setup(robot.clone(), &effects, resolution, table, self.steps_of(run, step) as f64 * step)?;
+        // Only its delay changes what the camera sees; the rest is what it makes of it.
+        let view = View::new(&effects);
+        let is_moving = |applied: &Applied| !matches!(applied.effect.action, Action::View(_));
+        let moving = terms.iter().zip(&effects).filter(|(_, applied)| is_moving(applied));
+        let key = motion_key(moving.map(|(term, _)| term), [resolution, step, view.delay], run, nuisance);
+        let moving: Vec<Applied> = effects.into_iter().filter(is_moving).collect();
+        let positions = self.seen.get_or(key, || self.positions(&moving, resolution, run, nuisance, (step, view.delay)))?;
         let signal = &self.signals[run];
-        // Channels share their times.
-        let mut times = signal.times.clone();
-        times.sort_by(f64::total_cmp);
-        times.dedup();
+        let at = |(t, channel): (&f64, &usize)| {
+            let row = times.partition_point(|time| time < t);
+            let first = 2 * (row * markers.len() + channel / 2);
+            10.0 * view.of([positions[first], positions[first + 1]])[channel % 2]
+        };
+        Ok(signal.times.iter().zip(&signal.channels).map(at).collect())
+    }
+
+    /// Positions of a run's markers (cm) at its times, x and z of each, as a camera sees them that is late by `delay` (s) and has no other error.
+    fn positions(
+        &self,
+        effects: &[Applied],
+        resolution: f64,
+        run: usize,
+        nuisance: &Nuisance,
+        (step, delay): (f64, f64),
+    ) -> Result<Vec<f64>, DiagnoseError> {
+        let Run { robot, markers, command, start, has_clock, times, .. } = &self.runs[run];
+        let table = command.table(&nuisance.shares, nuisance.base[Spread::GAIN]);
+        let Setup { robot, drive, chain, .. } =
+            setup(robot.clone(), effects, resolution, table, self.steps_of(run, step) as f64 * step)?;
         let rule: &[[f64; 2]] = if self.exposure > 0.0 { &OF_EXPOSURE } else { &[[0.0, 1.0]] };
         // Times at which positions are needed, with their rows and weights.
         let at_row = |(row, t): (usize, &f64)| {
-            let middle = if *has_clock { nuisance.time(*t) } else { *t } - view.delay;
+            let middle = if *has_clock { nuisance.time(*t) } else { *t } - delay;
             rule.iter().map(move |[node, weight]| ((middle + node * self.exposure).max(0.0), row, *weight))
         };
         let mut seen: Vec<(f64, usize, f64)> = times.iter().enumerate().flat_map(at_row).collect();
@@ -466,18 +505,13 @@ impl RobotPlant {
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
         let tracks = track(&robot, start, &drive, chain, step, markers, &seen.iter().map(|(t, ..)| *t).collect::<Vec<_>>())?;
         let n = markers.len();
-        let mut positions = vec![[0.0; 2]; times.len() * n];
+        let mut positions = vec![0.0; 2 * times.len() * n];
         for ((_, row, weight), at) in seen.iter().zip(tracks.chunks_exact(n)) {
-            for (mean, [x, z]) in positions[row * n..].iter_mut().zip(at) {
-                *mean = [mean[0] + weight * x, mean[1] + weight * z];
+            for (mean, position) in positions[2 * row * n..].iter_mut().zip(at.iter().flatten()) {
+                *mean += weight * position;
             }
         }
-        let at = |(t, channel): (&f64, &usize)| {
-            let row = times.partition_point(|time| time < t);
-            let seen = view.of(positions[row * n + channel / 2]);
-            10.0 * seen[channel % 2]
-        };
-        Ok(signal.times.iter().zip(&signal.channels).map(at).collect())
+        Ok(positions)
     }
 
     /// The values of a frequency response. An analyser has one clock and one gain, so only the gain of the inputs differs from run to run.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, prelude::*};
 
 use super::lanes::{Four, Lanes, Two, fma, inner};
 use super::law::{ContactLaw, FrictionModel};
@@ -54,9 +54,10 @@ enum Search {
     Part,
 }
 
-/// [`solve`] with tapes or cables at the sheet. Out of line, for few robots have them.
+/// [`solve`] with tapes or cables at the sheet. Out of line, for few robots have them; so it is compiled for the machine's instructions here.
 #[inline(never)]
 fn solve_attached(
+    level: Level,
     skew: bool,
     quads: &mut [Quad],
     levels: Range<usize>,
@@ -64,11 +65,16 @@ fn solve_attached(
     contact: impl ContactTerms,
     distal: &mut [Distal],
 ) -> Articulated {
-    if skew {
-        solve::<true>(quads, levels, base_joint, contact, distal)
-    } else {
-        solve::<false>(quads, levels, base_joint, contact, distal)
-    }
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || {
+            if skew {
+                solve::<true>(quads, levels, base_joint, contact, distal)
+            } else {
+                solve::<false>(quads, levels, base_joint, contact, distal)
+            }
+        },
+    ))
 }
 
 impl PlanarEngine {
@@ -179,7 +185,15 @@ impl PlanarEngine {
         let floor = self.floor.tip_to_base(among, law);
         if let Some(attachments) = &self.attachments {
             let contact = attachments.with(floor);
-            return solve_attached(skew, &mut self.quads, levels.clone(), &self.base_joint, contact, &mut self.distal);
+            return solve_attached(
+                self.level,
+                skew,
+                &mut self.quads,
+                levels.clone(),
+                &self.base_joint,
+                contact,
+                &mut self.distal,
+            );
         }
         if skew {
             solve::<true>(&mut self.quads, levels.clone(), &self.base_joint, floor, &mut self.distal)
@@ -342,7 +356,6 @@ fn quads_of(levels: &Range<usize>) -> Range<usize> {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
 
     use super::*;
     use crate::drive::Means;

@@ -88,9 +88,17 @@ impl PlanarEngine {
         result
     }
 
-    /// [`solve_step`](Self::solve_step) with tapes or cables at the sheet; repeatedly where they have friction, too.
+    /// [`solve_step`](Self::solve_step) with tapes or cables at the sheet; repeatedly where they have friction, too. Out of line, for few robots have them.
     #[inline(never)]
     fn solve_attached<S: Simd>(&mut self, simd: S, share: f64) -> Result<(), EngineError> {
+        simd.vectorize(
+            #[inline(always)]
+            || self.solve_with_attachments(simd, share),
+        )
+    }
+
+    #[inline(always)]
+    fn solve_with_attachments<S: Simd>(&mut self, simd: S, share: f64) -> Result<(), EngineError> {
         let (law, half) = (self.law, 0.5 * self.time_step);
         let (mut extensions, height) = (self.extensions.take(), self.root_height(simd));
         let Some(attachments) = &mut self.attachments else { return Ok(()) };
