@@ -107,17 +107,19 @@ impl JointExtensions {
     }
 
     /// Sets the moments against the present rates, and their derivatives at rest.
+    #[inline(always)]
     fn resist(&mut self) {
         if self.friction == 0.0 {
             return;
         }
         for k in 0..self.rates.len() {
             self.resisting[k] = self.resisting_at(k, self.dry[k], self.rates[k]);
-            self.at_rest_slope[k] = self.resisting_at(k, self.dry[k], Lanes::ZERO)[1];
+            self.at_rest_slope[k] = self.resisting_with(k, self.dry[k], Lanes::ZERO, Lanes::ZERO)[1];
         }
     }
 
     /// Sets the moments of dry friction for a step, which depend on the angles in its middle by the last rates.
+    #[inline(always)]
     fn set_dry_friction(&mut self, quads: &[Quad]) {
         let half = Lanes::splat(self.half_step);
         let mut before = f64x2::ZERO;
@@ -144,9 +146,15 @@ impl JointExtensions {
     /// Moment against the rates (rad/s) of quad `k`'s joints, and its derivative, for moments of dry friction `dry`.
     #[inline(always)]
     fn resisting_at(&self, k: usize, dry: Lanes, rate: Lanes) -> [Lanes; 2] {
+        let share = if self.is_repeated() { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() } else { Lanes::ZERO };
+        self.resisting_with(k, dry, rate, share)
+    }
+
+    /// [`resisting_at`](Self::resisting_at) for a known `share` of the dry friction, 0 at rest.
+    #[inline(always)]
+    fn resisting_with(&self, k: usize, dry: Lanes, rate: Lanes, share: Lanes) -> [Lanes; 2] {
         // As `Extensions::friction`.
         let moment_of_rate = &self.extensions.moment_of_rate;
-        let share = if self.is_repeated() { (Lanes::splat(1.0 / DRY_FRICTION_RATE) * rate).tanh() } else { Lanes::ZERO };
         let moment = dry * share;
         let slope = Lanes::splat(1.0 / DRY_FRICTION_RATE) * dry * (Lanes::splat(1.0) - share * share);
         if moment_of_rate.is_zero() {
