@@ -131,7 +131,7 @@ pub(super) fn adopted(
         let mut effect = effect(search, judged, index, standing, tied_with);
         let own = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
         taken.push(own);
-        effect.share = whole.share(own, search.candidate(&best.model().terms[index]).is_constant);
+        effect.share = whole.share(search, best, index, own);
         effect.gain_heldout = gain_heldout;
         let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
         let of_place =
@@ -145,7 +145,7 @@ pub(super) fn adopted(
     for Needed { index, own, instead } in needed_together(search, best, &whole, small) {
         taken[first + index] = own;
         let effect = &mut effects[first + index];
-        effect.share = whole.share(own, search.candidate(&terms[index]).is_constant);
+        effect.share = whole.share(search, best, index, own);
         let instead: Vec<&str> = instead.iter().map(|other| search.id(terms[*other].candidate)).collect();
         tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
@@ -187,9 +187,9 @@ fn effect(search: &Search, judged: &Judged, index: usize, standing: &Standing, t
 
 /// What causes have to explain, as χ² per value above that of the model with all of them.
 struct Whole {
-    /// Left by the refined nominal model: what constants share.
+    /// Left by the refined nominal model.
     bare: f64,
-    /// Left by the refined nominal model with re-tuned constants: what other causes share.
+    /// Left by the refined nominal model with re-tuned constants.
     tuned: f64,
 }
 
@@ -202,9 +202,14 @@ impl Whole {
         Ok(Self { bare: left(bare), tuned: left(&tuned) })
     }
 
-    /// The share of a cause that removes `own` (χ² per value).
-    fn share(&self, own: f64, is_constant: bool) -> f64 {
-        (own / if is_constant { self.bare } else { self.tuned }).clamp(0.0, 1.0)
+    /// The share of term `index`, which removes `own` (χ² per value), of what re-tuned constants leave. Constants among themselves, which leave nothing, share what the
+    /// nominal model leaves; so does one at the place of another cause, as a gain beside one that depends on the voltage: it may be what that one's law lacks.
+    fn share(&self, search: &Search, best: &Scored, index: usize, own: f64) -> f64 {
+        let cause = search.candidate(&best.model().terms[index]);
+        let mut others = best.model().terms.iter().map(|term| search.candidate(term)).filter(|other| !other.is_constant);
+        let is_at_a_law = others.any(|other| other.places.iter().any(|place| cause.places.contains(place)));
+        let is_of_bare = cause.is_constant && (is_at_a_law || self.tuned < MINOR_MISFIT);
+        (own / if is_of_bare { self.bare } else { self.tuned }).clamp(0.0, 1.0)
     }
 }
 
@@ -243,7 +248,7 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
         let Some((at, least)) = shorter.min_by(|a, b| a.1.total().total_cmp(&b.1.total())) else { break };
         let index = small.remove(at);
         let own = (search.chi2(&least) - search.chi2(&rest)).max(0.0) / count;
-        if own >= MINOR_MISFIT && whole.share(own, search.candidate(&best.model().terms[index]).is_constant) > MINOR_SHARE {
+        if own >= MINOR_MISFIT && whole.share(search, best, index, own) > MINOR_SHARE {
             let is_one = left_out.len() == 1;
             let instead = left_out.iter().copied().filter(|other| is_one || is_instead(other, index)).collect();
             needed.push(Needed { index, own, instead });
@@ -358,6 +363,23 @@ mod tests {
             let mut tied_with = vec!["b".to_owned()];
             tie_unstable(stability, &mut tied_with, &["c", "a", "b"]);
             assert_eq!(tied_with, tied, "{stability:?}");
+        }
+    }
+
+    #[test]
+    fn a_constant_shares_what_constants_leave_unless_a_law_of_its_place_may_lack_it() {
+        // The wave of the amplitude 3 leaves 3²/2 times the noise, that of 0.1 less than half the noise.
+        for (place, amplitude, is_of_bare) in [("elsewhere", 3.0, false), ("test", 3.0, true), ("elsewhere", 0.1, true)] {
+            let mut plant = Waves::new(&[("other", amplitude)]);
+            plant.candidates[1].is_constant = true;
+            plant.candidates[1].places = vec![place];
+            let search = search(&plant);
+            let terms = [0, 1].map(|candidate| Term { candidate, x: vec![0.0] });
+            let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
+            let whole = Whole { bare: 1000.0, ..Whole::of(&search, &best, &best).unwrap() };
+            let share = whole.share(&search, &best, 1, 1.0);
+            assert_eq!(share, if is_of_bare { 1e-3 } else { 1.0 / whole.tuned }, "{place} {amplitude}");
+            assert_eq!(whole.share(&search, &best, 0, 1.0), (1.0 / whole.tuned).min(1.0));
         }
     }
 
