@@ -356,7 +356,6 @@ fn quads_of(levels: &Range<usize>) -> Range<usize> {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
     use crate::drive::Means;
     use crate::engine::Engine;
