@@ -18,7 +18,7 @@ use super::bench::{self, Columns, Spread};
 use super::blocks::blocks;
 use super::kept::Kept;
 use super::noise::Noise;
-use super::plant::{Model, Nuisance, Plant};
+use super::plant::{Model, Nuisance, Plant, Term};
 
 /// Step of finite differences as a share of a parameter's scale.
 const DIFFERENCE: f64 = 0.02;
@@ -150,10 +150,7 @@ pub struct State {
 
 /// The bits of all that a prediction depends on.
 fn key(model: &Model, run: usize, nuisance: &Nuisance) -> Vec<u64> {
-    let terms = model.terms.iter().flat_map(|term| {
-        let numbers = term.x.iter().map(|x| x.to_bits());
-        [term.candidate as u64, term.x.len() as u64].into_iter().chain(numbers)
-    });
+    let terms = model.terms.iter().flat_map(Term::bits);
     let whole = [run as u64, model.resolution.to_bits(), u64::from(model.fine)];
     let nuisance = nuisance.shares.iter().chain(&nuisance.base);
     whole.into_iter().chain(terms).chain(nuisance.map(|x| x.to_bits())).collect()

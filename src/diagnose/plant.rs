@@ -68,6 +68,13 @@ pub struct Term {
     pub x: Vec<f64>,
 }
 
+impl Term {
+    /// The bits of all that a prediction depends on in it.
+    pub(super) fn bits(&self) -> impl Iterator<Item = u64> {
+        [self.candidate as u64, self.x.len() as u64].into_iter().chain(self.x.iter().map(|x| x.to_bits()))
+    }
+}
+
 /// The curve that a free form stands for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeCurve {

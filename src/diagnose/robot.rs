@@ -428,10 +428,8 @@ impl Plant for RobotPlant {
 
 /// The bits of all that the motion of a run depends on, and the times at which it is seen.
 fn motion_key<'t>(terms: impl Iterator<Item = &'t Term>, numbers: [f64; 3], run: usize, nuisance: &Nuisance) -> Vec<u64> {
-    let of_term =
-        |term: &'t Term| [term.candidate as u64, term.x.len() as u64].into_iter().chain(term.x.iter().map(|x| x.to_bits()));
     let nuisance = nuisance.shares.iter().chain(&nuisance.base).chain(&numbers).map(|x| x.to_bits());
-    std::iter::once(run as u64).chain(nuisance).chain(terms.flat_map(of_term)).collect()
+    std::iter::once(run as u64).chain(nuisance).chain(terms.flat_map(Term::bits)).collect()
 }
 
 /// A model made ready to run.
