@@ -2,7 +2,6 @@
 
 use super::DiagnoseError;
 use super::fit::{Convergence, sum_of_squares};
-use super::plant::Term;
 use super::search::{LEAST_BIC, Scored, Screened, Search, Trial};
 
 /// Candidates that are fitted after screening, named ones and free forms.
@@ -75,32 +74,16 @@ impl Search<'_> {
 
     /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
     fn with_its_law(&self, scored: Scored, index: usize) -> Scored {
-        let term = &scored.model().terms[index];
-        let own = self.candidate(term);
+        let own = self.candidate(&scored.model().terms[index]);
         if own.is_variant {
             return self.with_its_plain_law(scored, index);
         }
-        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
         let mut best: Option<Scored> = None;
-        for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
-            if variant.id != own.id || !variant.is_variant {
-                continue;
-            }
-            let mut tried: Vec<Vec<f64>> = Vec::new();
-            for start in &variant.starts {
-                // What both laws have in common stays as it is.
-                let x: Vec<f64> = start.iter().zip(&variant.parameters).map(|(x, p)| value(p.name).unwrap_or(*x)).collect();
-                if tried.contains(&x) {
-                    continue;
-                }
-                (self.progress)(&format!("another law of {}", own.id));
-                let mut model = scored.model().clone();
-                model.terms[index] = Term { candidate, x: x.clone() };
-                tried.push(x);
-                let Ok(other) = self.ranked(&model) else { continue };
-                if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
-                    best = Some(other);
-                }
+        for model in self.other_laws(scored.model(), index) {
+            (self.progress)(&format!("another law of {}", own.id));
+            let Ok(other) = self.ranked(&model) else { continue };
+            if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
+                best = Some(other);
             }
         }
         // One that is no better so far is not fitted to the end, and one that cannot be is none.

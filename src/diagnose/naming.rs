@@ -110,7 +110,7 @@ impl<'a> Place<'a> {
                 let several = self.several(std::slice::from_ref(one));
                 several.filter(|several| self.search.is_worth(&several.scored, &one.scored)).or(standing)
             }
-            None => self.several(&others),
+            None => self.elsewhere().or_else(|| self.several(&others)),
         };
         let found = found.map(|found| found.scored);
         Ok((if found.is_some() { found } else { self.alone()? }, nearest))
@@ -149,14 +149,7 @@ impl<'a> Place<'a> {
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
     fn single(&self) -> Result<Vec<Attempt>, DiagnoseError> {
-        let screened = self.search.screen_of(&self.bare, |candidate| self.is_name(candidate))?;
-        let own = PROMISING_IN_PLACE * (self.bare.total() - self.best.total());
-        let rivals: Vec<&(f64, Model)> = screened.ranked.iter().filter(|(_, model)| self.is_rival(model)).collect();
-        // The nearest one is shown even if it is far.
-        let promising = rivals.iter().enumerate().filter(|(at, (gain, _))| *at == 0 || *gain >= own).map(|(_, rival)| *rival);
-        let models = self.search.finalists(promising, MOST_NAMES);
-        let start = |model: &Model| self.search.start_beyond(model, &screened).ok();
-        let mut tried: Vec<Attempt> = models.iter().filter_map(|model| self.attempt(&start(model)?)).collect();
+        let mut tried = self.promising(|candidate| self.is_name(candidate), 1)?;
         if tried.iter().all(|attempt| attempt.taken < LEAST_TAKEN) {
             // Constants that the free form did not need may make up for what a name lacks.
             let most = tried.iter().max_by(|a, b| a.taken.total_cmp(&b.taken));
@@ -169,6 +162,24 @@ impl<'a> Place<'a> {
             tried.extend(self.attempt(&kept).map(|kept| Attempt { name: name.unwrap_or(kept.name), ..kept }));
         }
         Ok(tried)
+    }
+
+    /// A single name of another place that is as good as the free form. Near a resonance, memories of the joints, of the voltage and of the driver do nearly the
+    /// same, and each has a free form.
+    fn elsewhere(&self) -> Option<Attempt> {
+        let tried = self.promising(|candidate| !(candidate.is_free_form || self.is_name(candidate)), 0).ok()?;
+        self.simplest(tried).filter(|attempt| self.is_as_good(attempt, &self.best))
+    }
+
+    /// Promising single ones of those candidates that are wanted, and the first `least` even if they are far.
+    fn promising(&self, is_wanted: impl Fn(&Candidate) -> bool, least: usize) -> Result<Vec<Attempt>, DiagnoseError> {
+        let screened = self.search.screen_of(&self.bare, is_wanted)?;
+        let own = PROMISING_IN_PLACE * (self.bare.total() - self.best.total());
+        let ranked = screened.ranked.iter().enumerate();
+        let promising = ranked.filter(|(at, (gain, _))| *at < least || *gain >= own).map(|(_, ranked)| ranked);
+        let models = self.search.finalists(promising, MOST_NAMES);
+        let start = |model: &Model| self.search.start_beyond(model, &screened).ok();
+        Ok(models.iter().filter_map(|model| self.attempt(&start(model)?)).collect())
     }
 
     /// Two or three names that are as good as the free form, none if none are: beside the best single ones of `tried`, then those that would take most

@@ -70,14 +70,14 @@ pub fn diagnose(
     spikes += causes.spikes;
     // The refined nominal model: its misfit is what the causes have to explain.
     let bare = search.fitted_at_its_spread(&Model { terms: Vec::new(), ..causes.best.model().clone() })?;
-    let Decided { judged, doubts, dropped } = decide(&search, causes.best.clone(), &bare, causes.open, nominal_resolution)?;
+    let Decided { judged, doubts, insufficient: too_few, dropped } = decide(&search, causes.best.clone(), &bare, causes.open, nominal_resolution)?;
     search.estimator.fit_nuisances(judged.best.model(), &search.split.judge)?;
     let [nominal, calibrated, best] = [nominal, calibrated, judged.best].map(|scored| search.with_judged(scored));
     let (nominal, calibrated, judged) = (nominal?, calibrated?, Judged { best: best?, ..judged });
     progress("tied causes");
     let ties = Ties::new(&search, &judged.best, &causes.replaced, causes.coarse_total);
     let Adoption { effects, unseen, pairs } = adopted(&search, &judged, &bare, &causes, &ties)?;
-    let insufficient = insufficient.or_else(|| if is_nothing(&effects) { doubts.first().cloned() } else { None });
+    let insufficient = insufficient.or(too_few.filter(|_| is_nothing(&effects)));
     let mut remarks = doubts;
     if spikes > 0 {
         remarks.insert(0, format!("{spikes} single values far off their neighbours' residuals were left out"));
@@ -161,6 +161,8 @@ struct Decided {
     judged: Judged,
     /// Why each of them was dropped.
     doubts: Vec<String>,
+    /// The first of them that is for want of data, not for what the model leaves.
+    insufficient: Option<String>,
     /// The model with the last one that was dropped.
     dropped: Option<Model>,
 }
@@ -168,15 +170,18 @@ struct Decided {
 /// Judges a model, and drops causes whose intervals contain their off values.
 fn decide(search: &Search, best: Scored, bare: &Scored, open: f64, nominal_resolution: f64) -> Result<Decided, DiagnoseError> {
     let mut judged = judge(search, best, bare, open, nominal_resolution)?;
-    let (mut doubts, mut dropped, remark) = (Vec::new(), None, judged.remark.take());
+    let (mut doubts, mut insufficient, mut dropped, remark) = (Vec::new(), None, None, judged.remark.take());
     while let Some((index, words)) = doubtful(search, &judged)? {
         let model = search.without(&judged.best, index)?;
         dropped = Some(judged.best.model().clone());
+        if !judged.is_unexplained {
+            insufficient.get_or_insert_with(|| words.clone());
+        }
         doubts.push(words);
         judged = judge(search, search.fitted(&model)?, bare, f64::INFINITY, nominal_resolution)?;
     }
     judged.remark = remark.or(judged.remark);
-    Ok(Decided { judged, doubts, dropped })
+    Ok(Decided { judged, doubts, insufficient, dropped })
 }
 
 /// The causes beside the discretisation that are no minor ones.

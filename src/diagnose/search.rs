@@ -754,6 +754,28 @@ impl Search<'_> {
         Some(model)
     }
 
+    /// The starts of a model with other laws of the cause of term `index` than its plain one; what both laws have in common stays as it is.
+    pub(super) fn other_laws(&self, model: &Model, index: usize) -> Vec<Model> {
+        let term = &model.terms[index];
+        let own = self.candidate(term);
+        let value = |name: &str| own.parameters.iter().position(|p| p.name == name).map(|at| term.x[at]);
+        let mut found: Vec<Model> = Vec::new();
+        for (candidate, variant) in self.estimator.plant.candidates().iter().enumerate() {
+            if variant.id != own.id || !variant.is_variant {
+                continue;
+            }
+            for start in &variant.starts {
+                let x = start.iter().zip(&variant.parameters).map(|(x, p)| value(p.name).unwrap_or(*x)).collect();
+                let mut other = model.clone();
+                other.terms[index] = Term { candidate, x };
+                if !found.contains(&other) {
+                    found.push(other);
+                }
+            }
+        }
+        found
+    }
+
     /// Sets what re-tuned constants leave to what `constants` leaves.
     pub fn set_unexplained(&mut self, constants: &Scored) {
         let (chi2, runs) = self.chi2_to_judge_by(constants);
@@ -894,6 +916,9 @@ impl Search<'_> {
             if own < self.worth(&self.split.all()) {
                 continue;
             }
+            if self.candidate(removed).is_constant {
+                found.extend(self.laws_in_place(&without, removed, best));
+            }
             let beside = self.screened(&without, &responses, Some(index));
             let likely = beside.ranked.iter().take_while(|(gain, _)| *gain >= LIKELY_IN_PLACE * own);
             let likely: Vec<usize> = likely.filter_map(|(_, model)| Some(model.terms.last()?.candidate)).collect();
@@ -910,6 +935,21 @@ impl Search<'_> {
             }
         }
         Ok(found)
+    }
+
+    /// Other laws of the causes of the model `without` a constant: next to a plain law it may stand for a further parameter, as damping does for that of a clamp.
+    fn laws_in_place(&self, without: &Scored, removed: &Term, best: &Scored) -> Vec<(usize, Trial)> {
+        let plain = (0..without.model().terms.len()).filter(|index| {
+            let candidate = self.candidate(&without.model().terms[*index]);
+            !(candidate.is_variant || candidate.is_free_form)
+        });
+        let models = plain.flat_map(|index| self.other_laws(without.model(), index).into_iter().map(move |model| (index, model)));
+        let trial = |(index, model): (usize, Model)| {
+            let scored = self.ranked_at_its_spread(&model).ok()?;
+            let scored = self.in_its_resolution(scored, best);
+            Some((removed.candidate, Trial { candidate: model.terms[index].candidate, scored }))
+        };
+        models.filter_map(trial).collect()
     }
 
     /// A replacement in the discretisation that suits it, if it leaves little more than `best`, which leaves something: that of `best` may stand for what a wrong

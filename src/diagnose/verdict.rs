@@ -124,9 +124,14 @@ pub(super) fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize
         }
         let numbers: Vec<String> =
             estimates(search, index, term, intervals).iter().map(|e| names::words(candidate.id, e)).collect();
+        // What is left widens the intervals, however many the data are.
+        let why = if judged.is_unexplained {
+            format!("no cause is named: {:.0} % of the misfit is left with", 100.0 * judged.unexplained_fraction)
+        } else {
+            "the data are insufficient to name a cause: they are explained as well without".into()
+        };
         let words = format!(
-            "the data are insufficient to name a cause: they are explained as well without {} ({}), whose interval contains the value at which it has \
-             no effect",
+            "{why} {} ({}), whose interval contains the value at which it has no effect",
             names::cause(candidate.id),
             numbers.join("; ")
         );
