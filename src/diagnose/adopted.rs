@@ -142,7 +142,7 @@ pub(super) fn adopted(
         effects.push(effect);
     }
     let first = effects.len() - terms.len();
-    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < whole.least;
+    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < least_taken(whole.left);
     let small: Vec<usize> = (0..terms.len()).filter(is_small).collect();
     for Needed { index, own, instead } in needed_together(search, best, &whole, small) {
         taken[first + index] = own;
@@ -151,7 +151,7 @@ pub(super) fn adopted(
         let instead: Vec<&str> = instead.iter().map(|other| search.id(terms[*other].candidate)).collect();
         tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
-    set_roles(&mut effects, &taken, whole.least);
+    set_roles(&mut effects, &taken, whole.left);
     let pairs = weighed.into_iter().flat_map(|weighed| weighed.pairs).collect();
     Ok(Adoption { effects, unseen, pairs })
 }
@@ -193,8 +193,8 @@ struct Whole {
     bare: f64,
     /// Left by the refined nominal model with re-tuned constants.
     tuned: f64,
-    /// What a cause beside a larger one has to remove.
-    least: f64,
+    /// Left by the model with all causes, above 1.
+    left: f64,
 }
 
 impl Whole {
@@ -203,7 +203,7 @@ impl Whole {
         let tuned = search.fitted_at_its_spread(&tuned)?;
         let count = search.estimator.count(&search.split.all()) as f64;
         let left = |scored: &Scored| ((search.chi2(scored) - search.chi2(best)) / count).max(f64::MIN_POSITIVE);
-        Ok(Self { bare: left(bare), tuned: left(&tuned), least: MINOR_MISFIT.max(LEAST_TO_LEFT * search.above(best)) })
+        Ok(Self { bare: left(bare), tuned: left(&tuned), left: search.above(best) })
     }
 
     /// The share of term `index`, which removes `own` (χ² per value), of what re-tuned constants leave. Constants among themselves, which leave nothing, share what the
@@ -252,7 +252,7 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
         let Some((at, least)) = shorter.min_by(|a, b| a.1.total().total_cmp(&b.1.total())) else { break };
         let index = small.remove(at);
         let own = (search.chi2(&least) - search.chi2(&rest)).max(0.0) / count;
-        if own >= whole.least && whole.share(search, best, index, own) > MINOR_SHARE {
+        if own >= least_taken(whole.left) && whole.share(search, best, index, own) > MINOR_SHARE {
             let is_one = left_out.len() == 1;
             let instead = left_out.iter().copied().filter(|other| is_one || is_instead(other, index)).collect();
             needed.push(Needed { index, own, instead });
@@ -264,31 +264,39 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
     needed
 }
 
-/// Sets the roles of causes, from their shares, what each removes and what one beside a larger one has to remove at `least` (χ² per value).
-fn set_roles(effects: &mut [Adopted], taken: &[f64], least: f64) {
-    let most = taken.iter().copied().fold(0.0, f64::max);
+/// What a cause beside a larger one has to remove where this is `left` by all (χ² per value).
+fn least_taken(left: f64) -> f64 {
+    MINOR_MISFIT.max(LEAST_TO_LEFT * left)
+}
+
+/// Sets the roles of causes, from their shares, what each removes and what is `left` by all (χ² per value).
+fn set_roles(effects: &mut [Adopted], taken: &[f64], left: f64) {
     let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
     order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
-    let mut sum = 0.0;
-    // What slope of a loop is called its gain is a convention: within the opening of the loop a gain is no cause of its own.
-    let value = |id: &str, name: &str| {
-        let effect = effects.iter().find(|effect| effect.id == id)?;
-        effect.parameters.iter().find(|p| p.name == name).map(|p| p.value)
-    };
-    let is_convention = match (value("hysteresis", "width"), value("actuation-gain", "scale")) {
-        (Some(width), Some(scale)) => (scale - 1.0).abs() < width,
-        _ => false,
-    };
+    let (most, mut sum) = (taken.iter().copied().fold(0.0, f64::max), 0.0);
+    let is_convention = is_gain_a_convention(effects, left);
     for k in order {
         sum += effects[k].share;
         let effect = &mut effects[k];
         // A tied one says what else may be chosen.
         let is_unstable = effect.stability.is_some_and(|share| share < LEAST_STABILITY) && effect.tied_with.is_empty();
-        let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT || taken[k] < least.min(most);
+        let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT || taken[k] < least_taken(left).min(most);
         if is_small || is_unstable || (is_convention && effect.id == "actuation-gain") {
             effect.role = Part::Minor;
         }
     }
+}
+
+/// True if a gain is no cause of its own. What slope of a loop is called its gain is a convention, within the opening of the loop; so is the time at which creep
+/// begins to count where its law leaves more than half the noise, within a decade of it.
+fn is_gain_a_convention(effects: &[Adopted], left: f64) -> bool {
+    let value = |id: &str, name: &str| {
+        let effect = effects.iter().find(|effect| effect.id == id)?;
+        effect.parameters.iter().find(|p| p.name == name).map(|p| p.value)
+    };
+    let creep = value("creep", "per_decade").filter(|_| left > VISIBLE);
+    let open = value("hysteresis", "width").into_iter().chain(creep).fold(0.0, f64::max);
+    value("actuation-gain", "scale").is_some_and(|scale| (scale - 1.0).abs() < open)
 }
 
 /// The refinement as an adopted cause.
@@ -345,7 +353,7 @@ mod tests {
     /// Roles of causes that remove 1 of χ² per value each.
     fn roles(mut effects: Vec<Adopted>) -> Vec<Part> {
         let taken = vec![1.0; effects.len()];
-        set_roles(&mut effects, &taken, MINOR_MISFIT);
+        set_roles(&mut effects, &taken, 0.0);
         effects.iter().map(|effect| effect.role).collect()
     }
 
@@ -358,12 +366,30 @@ mod tests {
         let stabilities = [cause("a", 0.9, Some(0.79), &[]), cause("b", 0.9, Some(0.79), &["c"]), cause("d", 0.9, None, &[])];
         assert_eq!(roles(stabilities.to_vec()), [Minor, Cause, Cause]);
         let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
-        set_roles(&mut within_the_noise, &[0.2], MINOR_MISFIT);
+        set_roles(&mut within_the_noise, &[0.2], 0.0);
         assert_eq!(within_the_noise[0].role, Minor);
-        // Two are left: the first takes less than three times that, but most of all.
+        // Both take less than three times what is left, the first one most of all.
         let mut beside = [0.6, 0.4].map(|share| cause("a", share, Some(1.0), &[]));
-        set_roles(&mut beside, &[5.0, 4.0], 6.0);
+        set_roles(&mut beside, &[5.0, 4.0], 2.0);
         assert_eq!(beside.map(|effect| effect.role), [Cause, Minor]);
+    }
+
+    #[test]
+    fn a_gain_within_a_loop_or_a_decade_of_creep_that_is_not_followed_is_a_convention() {
+        let with = |id: &str, name: &str, value: f64| Adopted {
+            parameters: vec![Estimate { name: name.into(), value, unit: String::new(), ci95: [None; 2], at_bound: false }],
+            ..cause(id, 0.5, None, &[])
+        };
+        let gain = |scale: f64| with("actuation-gain", "scale", scale);
+        for (id, name, left, is_one) in [
+            ("hysteresis", "width", 0.0, true),
+            ("creep", "per_decade", 0.0, false),
+            ("creep", "per_decade", 0.3, true),
+            ("tip-mass", "mass_g", 0.3, false),
+        ] {
+            let is_convention = |scale: f64| is_gain_a_convention(&[gain(scale), with(id, name, 0.05)], left);
+            assert_eq!([1.04, 0.96, 1.06].map(is_convention), [is_one, is_one, false], "{id} {left}");
+        }
     }
 
     #[test]

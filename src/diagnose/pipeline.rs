@@ -70,7 +70,8 @@ pub fn diagnose(
     spikes += causes.spikes;
     // The refined nominal model: its misfit is what the causes have to explain.
     let bare = search.fitted_at_its_spread(&Model { terms: Vec::new(), ..causes.best.model().clone() })?;
-    let Decided { judged, doubts, insufficient: too_few, dropped } = decide(&search, causes.best.clone(), &bare, causes.open, nominal_resolution)?;
+    let Decided { judged, doubts, insufficient: too_few, dropped } =
+        decide(&search, causes.best.clone(), &bare, causes.open, nominal_resolution)?;
     search.estimator.fit_nuisances(judged.best.model(), &search.split.judge)?;
     let [nominal, calibrated, best] = [nominal, calibrated, judged.best].map(|scored| search.with_judged(scored));
     let (nominal, calibrated, judged) = (nominal?, calibrated?, Judged { best: best?, ..judged });
