@@ -120,6 +120,9 @@ pub(super) fn adopted(
     // Gains are of causes, not of the constants that are free where a fold leaves one out.
     let tuned = needs.concat();
     let unseen = Unseen::of(search, best, &needs, &tuned)?;
+    // Constants that make up for the discretisation.
+    let free = causes.best.model().terms.iter();
+    let within: Vec<usize> = free.filter(|term| !search.is_credible(&causes.best, term)).map(|term| term.candidate).collect();
     let mut effects = Vec::new();
     if judged.refined {
         let coarse = Unseen::of(search, &judged.coarse, &needs, &tuned)?;
@@ -135,6 +138,9 @@ pub(super) fn adopted(
         taken.push(own);
         effect.share = whole.share(search, best, index, own);
         effect.gain_heldout = gain_heldout;
+        if within.contains(&terms[index].candidate) {
+            effect.role = Part::Minor;
+        }
         let is_of = |tried: &Nearest| tried.id == effect.id || effect.curve.is_some();
         let of_place =
             causes.nearest.iter().find(|(places, tried)| places.contains(&effect.place.as_str()) && tried.iter().any(is_of));

@@ -814,17 +814,21 @@ impl Search<'_> {
     /// # Errors
     /// [`DiagnoseError`] if a model cannot be simulated.
     pub fn backward(&self, from: Scored) -> Result<Scored, DiagnoseError> {
-        let mut best = from;
+        let (mut best, mut kept) = (from, Vec::new());
         loop {
             let shorter = |index: usize| {
                 (self.progress)(&format!("doing without {}", self.id(best.model().terms[index].candidate)));
                 self.ranked(&self.without(&best, index)?)
             };
-            // First those within the error of the discretisation.
-            let plant = self.estimator.plant;
-            let idle = best.model().terms.iter().position(|term| !plant.is_credible(term, best.model().resolution));
-            if let Some(idle) = idle {
-                best = self.fitted(shorter(idle)?.model())?;
+            // First those within the error of the discretisation, unless more than half the noise comes back: no other discretisation does just that then.
+            let is_idle = |term: &Term| !self.is_credible(&best, term) && !kept.contains(&term.candidate);
+            if let Some(idle) = best.model().terms.iter().position(is_idle) {
+                let without = self.fitted(shorter(idle)?.model())?;
+                if self.above(&without) < self.above(&best) + VISIBLE {
+                    best = without;
+                } else {
+                    kept.push(best.model().terms[idle].candidate);
+                }
                 continue;
             }
             // A term without which the model diverges is needed.
@@ -836,6 +840,11 @@ impl Search<'_> {
             }
             best = least;
         }
+    }
+
+    /// True if a term of a model does more than its discretisation may be wrong by.
+    pub(super) fn is_credible(&self, scored: &Scored, term: &Term) -> bool {
+        self.estimator.plant.is_credible(term, scored.model().resolution)
     }
 
     /// A model without term `index`, whose other coordinates make up for it as far as they can by the linear estimate, if that lowers χ².
@@ -912,8 +921,8 @@ impl Search<'_> {
             let Ok(without) = without else { continue };
             // What candidates do beside the cause leads to those that are worth a screening without it; other laws of a cause cannot be tried beside it.
             let own = without.total() - best.total();
-            // A constant that is freed beside a cause may take less than a cause has to.
-            if own < self.worth(&self.split.all()) {
+            // A constant that is freed beside a cause may take less than a cause has to, or be within the error of the discretisation.
+            if own < self.worth(&self.split.all()) || !self.is_credible(best, removed) {
                 continue;
             }
             if self.candidate(removed).is_constant {
