@@ -58,6 +58,9 @@ const ALIKE: f64 = 0.9;
 const ENOUGH: f64 = 0.5;
 /// ... unless they then change less than this share of what is missing, as a limit beyond the range does.
 const STILL_THERE: f64 = 0.3;
+/// A fit begins at a given start if the one by a linear estimate lowers χ² by less than this share of what it should: a limit beyond the range of the data does nothing,
+/// and has no derivatives to begin with.
+const AS_EXPECTED: f64 = 0.05;
 /// Most alternations between nuisance parameters and the model.
 const MOST_TURNS: usize = 10;
 /// Turns are extrapolated if each goes on by at least this share of the one before, as if by no more than the other.
@@ -318,23 +321,37 @@ impl Search<'_> {
         let before: Vec<Residuals> = runs.iter().map(|run| screened.residuals[*run].clone()).collect();
         let chi2 = |residuals: &[Residuals]| residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>();
         let moved = self.estimator.residuals_of(model, runs)?;
+        let expected = screened.ranked.iter().find(|(_, ranked)| ranked == model).map_or(0.0, |(gain, _)| *gain);
         let change = moved.iter().zip(&before).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
         let columns: Derivatives = std::iter::once(change).chain(self.known(screened)).collect();
         let (gradient, mut information) = normal_equations(&before, &columns);
         (0..columns.len()).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
         let mut best = (chi2(&moved), model.clone());
-        let Some(by) = information.lu().solve(&-gradient).filter(|by| by[0] > 0.0 && by.iter().all(|by| by.is_finite())) else {
-            return Ok(best.1);
-        };
-        for share in [1.0, 0.5, 0.25] {
-            let start = self.on_the_way(model, screened.terms, &(&by * share));
+        let by = information.lu().solve(&-gradient).filter(|by| by[0] > 0.0 && by.iter().all(|by| by.is_finite()));
+        for (by, share) in by.iter().flat_map(|by| [1.0, 0.5, 0.25].map(|share| (by, share))) {
+            let start = self.on_the_way(model, screened.terms, &(by * share));
             // A point that cannot be simulated is none to start from.
             let Ok(residuals) = self.estimator.residuals_of(&start, runs) else { continue };
             if chi2(&residuals) < best.0 {
                 best = (chi2(&residuals), start);
             }
         }
-        Ok(best.1)
+        let is_as_expected = chi2(&before) - best.0 >= AS_EXPECTED * expected;
+        Ok(if is_as_expected { best.1 } else { self.given_start(model).unwrap_or(best.1) })
+    }
+
+    /// The model with that given start of its last term which leaves least, in the stead of where a linear estimate has moved one to.
+    fn given_start(&self, model: &Model) -> Option<Model> {
+        let (last, before) = model.terms.split_last()?;
+        let given = |x: &Vec<f64>| {
+            let term = Term { candidate: last.candidate, x: x.clone() };
+            let start = Model { terms: before.iter().cloned().chain([term]).collect(), ..model.clone() };
+            let residuals = self.estimator.residuals_of(&start, &self.split.fit).ok()?;
+            Some((residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>(), start))
+        };
+        let starts = &self.candidate(last).starts;
+        let least = starts.iter().filter_map(given).min_by(|a, b| a.0.total_cmp(&b.0));
+        least.filter(|_| !self.candidate(last).is_free_form).map(|(_, start)| start)
     }
 
     /// A model with its terms from `first` on moved from their off values by the share `by[0]` of the way to where they are, and the coordinates of the
