@@ -193,3 +193,28 @@ impl Search<'_> {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::plant::{Model, Term};
+    use crate::diagnose::waves::{Waves, search};
+
+    #[test]
+    fn of_free_forms_that_are_closer_than_a_name_the_least_costly_on_all_runs_is_adopted() {
+        let mut plant = Waves::new(&[("other", 3.0)]);
+        plant.candidates[1].is_free_form = true;
+        plant.candidates[2].is_free_form = true;
+        let search = search(&plant);
+        let trial = |candidate: usize, select: f64, fitted: f64| {
+            let model = Model::new(vec![Term { candidate, x: vec![1.0] }], 1.0, false);
+            Trial { candidate, scored: Scored { select, fitted, ..search.fitted(&model).unwrap() } }
+        };
+        let adopted = |trials: &[Trial]| search.top(trials).unwrap().model().terms[0].candidate;
+        let named = trial(0, 1000.0, 2000.0);
+        assert_eq!(adopted(&[trial(1, 900.0, 1800.0), trial(2, 910.0, 1700.0), named.clone()]), 2);
+        // One that leaves more than the name on select runs, the least on all, is not.
+        assert_eq!(adopted(&[trial(1, 900.0, 1800.0), named.clone(), trial(2, 1010.0, 1500.0)]), 1);
+        assert_eq!(adopted(&[named, trial(2, 1010.0, 1500.0)]), 0);
+    }
+}

@@ -303,3 +303,25 @@ fn is_of_place(search: &Search, free: &Term, candidate: &Candidate) -> bool {
 fn is_of(search: &Search, free: &Term, term: &Term) -> bool {
     is_of_place(search, free, search.candidate(term))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::waves::{Waves, candidate, search};
+
+    #[test]
+    fn a_name_of_another_place_stands_if_it_is_as_good_as_the_free_form() {
+        for (hidden, stands) in [("other", true), ("first", false)] {
+            let mut plant = Waves::new(&[(hidden, 3.0)]);
+            // A free form without a name at its place, which does what is hidden.
+            plant.candidates = vec![Candidate { is_free_form: true, places: vec!["elsewhere"], ..candidate(hidden) }];
+            plant.candidates.push(Candidate { id: "name", ..candidate("other") });
+            let mut search = search(&plant);
+            let term = Term { candidate: 0, x: vec![1.0] };
+            let open = search.fitted(&Model::new(vec![term], 1.0, false)).unwrap();
+            let named = name(&mut search, open).unwrap().best;
+            let names: Vec<_> = named.model().terms.iter().map(|term| term.candidate).collect();
+            assert_eq!(names, if stands { [1] } else { [0] }, "{hidden}");
+        }
+    }
+}

@@ -58,7 +58,7 @@ const ALIKE: f64 = 0.9;
 const ENOUGH: f64 = 0.5;
 /// ... unless they then change less than this share of what is missing, as a limit beyond the range does.
 const STILL_THERE: f64 = 0.3;
-/// A fit begins at a given start if the one by a linear estimate lowers χ² by less than this share of what it should: a limit beyond the range of the data does nothing,
+/// A fit begins on the way to a given start if the one by a linear estimate lowers χ² by less than this share of what it should: a limit beyond the range of the data does nothing,
 /// and has no derivatives to begin with.
 const AS_EXPECTED: f64 = 0.05;
 /// Most alternations between nuisance parameters and the model.
@@ -337,21 +337,24 @@ impl Search<'_> {
             }
         }
         let is_as_expected = chi2(&before) - best.0 >= AS_EXPECTED * expected;
-        Ok(if is_as_expected { best.1 } else { self.given_start(model).unwrap_or(best.1) })
+        let given = if is_as_expected { None } else { self.given_start(model, best.0) };
+        Ok(given.unwrap_or(best.1))
     }
 
-    /// The model with that given start of its last term which leaves least, in the stead of where a linear estimate has moved one to.
-    fn given_start(&self, model: &Model) -> Option<Model> {
+    /// The model with its last term on the way from a given start to where it has no effect, where that leaves less than `chi2` of the fit runs, and the least.
+    fn given_start(&self, model: &Model, chi2: f64) -> Option<Model> {
         let (last, before) = model.terms.split_last()?;
-        let given = |x: &Vec<f64>| {
-            let term = Term { candidate: last.candidate, x: x.clone() };
+        let Candidate { starts, parameters, is_free_form, .. } = self.candidate(last);
+        let on_the_way = |x: &Vec<f64>, share: f64| {
+            let moved = x.iter().zip(parameters).map(|(x, free)| free.off.map_or(*x, |off| off + share * (x - off)));
+            let term = Term { candidate: last.candidate, x: moved.collect() };
             let start = Model { terms: before.iter().cloned().chain([term]).collect(), ..model.clone() };
             let residuals = self.estimator.residuals_of(&start, &self.split.fit).ok()?;
             Some((residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>(), start))
         };
-        let starts = &self.candidate(last).starts;
-        let least = starts.iter().filter_map(given).min_by(|a, b| a.0.total_cmp(&b.0));
-        least.filter(|_| !self.candidate(last).is_free_form).map(|(_, start)| start)
+        let starts = starts.iter().filter(|_| !is_free_form).flat_map(|x| [1.0, 0.8, 0.6, 0.4, 0.2].map(|share| (x, share)));
+        let least = starts.filter_map(|(x, share)| on_the_way(x, share)).min_by(|a, b| a.0.total_cmp(&b.0));
+        least.filter(|(left, _)| *left < chi2).map(|(_, start)| start)
     }
 
     /// A model with its terms from `first` on moved from their off values by the share `by[0]` of the way to where they are, and the coordinates of the
@@ -1112,7 +1115,7 @@ pub fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::waves::{Waves, search};
+    use crate::diagnose::waves::{Waves, candidate, search};
 
     fn found(plant: &Waves) -> Vec<&'static str> {
         let mut search = search(plant);
@@ -1151,6 +1154,46 @@ mod tests {
             Some(DVector::from_element(10, (term.x[0] - 40.0).max(0.0)))
         });
         assert_eq!(sized[0].0.x, [50.0]);
+    }
+
+    #[test]
+    fn a_fit_of_a_limit_begins_where_it_does_something() {
+        // What is above 2.5 is missing; from a limit of 1 the linear estimate leads to one above 3, which does nothing.
+        let mut plant = Waves::new(&[("limit", 0.4)]);
+        plant.candidates = vec![candidate("limit")];
+        plant.candidates[0].parameters[0].bounds = [0.0, 10.0];
+        let search = search(&plant);
+        let plain = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+        let screened = search.screen_of(&plain, |_| true).unwrap();
+        let model = &screened.ranked[0].1;
+        assert!(model.terms[0].x[0] < 1.0 / 3.0, "{model:?}");
+        let limit = 1.0 / search.ranked_beyond(model, &screened).unwrap().model().terms[0].x[0];
+        assert!((limit - 2.5).abs() < 0.1, "{limit}");
+    }
+
+    #[test]
+    fn a_law_with_a_further_parameter_is_tried_in_the_place_of_a_constant() {
+        let mut plant = Waves::new(&[("second", 5.0), ("other", 1.0)]);
+        plant.candidates[0].is_constant = true;
+        let search = search(&plant);
+        let terms = [0, 2].map(|candidate| Term { candidate, x: vec![1.0] });
+        let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
+        let replaced = search.replacements(&best, 1).unwrap();
+        let law = replaced.iter().find(|(removed, trial)| (*removed, trial.candidate) == (0, 3));
+        assert!((law.unwrap().1.scored.total() - best.total()).abs() < 1.0);
+    }
+
+    #[test]
+    fn constants_within_the_discretisation_s_error_stay_where_much_comes_back_without_them() {
+        // Half of the squares: 4.5 and 0.18 times the noise.
+        for (amplitude, stays) in [(3.0, true), (0.6, false)] {
+            let mut plant = Waves::new(&[("other", amplitude)]);
+            plant.candidates[0].is_constant = true;
+            plant.tolerance = 10.0;
+            let search = search(&plant);
+            let best = search.fitted(&search.with_constants(&Model::new(Vec::new(), 1.0, false))).unwrap();
+            assert_eq!(search.backward(best).unwrap().model().terms.len() == 1, stays, "{amplitude}");
+        }
     }
 
     #[test]

@@ -158,7 +158,10 @@ pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
         return main;
     }
     let names: Vec<String> = minor.iter().map(|effect| names::cause(&effect.id)).collect();
-    format!("{main} A rest of less than half the noise or 2 % of the misfit goes with {}; that is no cause.", names.join(", "))
+    format!(
+        "{main} A rest goes with {}; that is no cause, but within half the noise, 2 % of the misfit or what the discretisation and other laws leave open.",
+        names.join(", ")
+    )
 }
 
 #[cfg(test)]

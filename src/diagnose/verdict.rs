@@ -124,17 +124,19 @@ pub(super) fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize
         }
         let numbers: Vec<String> =
             estimates(search, index, term, intervals).iter().map(|e| names::words(candidate.id, e)).collect();
-        // What is left widens the intervals, however many the data are.
-        let why = if judged.is_unexplained {
-            format!("no cause is named: {:.0} % of the misfit is left with", 100.0 * judged.unexplained_fraction)
+        let cause = format!("{} ({})", names::cause(candidate.id), numbers.join("; "));
+        let words = if judged.is_unexplained {
+            // What is left widens the intervals, however many the data are.
+            format!(
+                "{cause} is not named: {:.0} % of the misfit is left with it, and its interval contains the value at which it has no effect",
+                100.0 * judged.unexplained_fraction
+            )
         } else {
-            "the data are insufficient to name a cause: they are explained as well without".into()
+            format!(
+                "the data are insufficient to name a cause: they are explained as well without {cause}, whose interval contains the value at which it \
+                 has no effect"
+            )
         };
-        let words = format!(
-            "{why} {} ({}), whose interval contains the value at which it has no effect",
-            names::cause(candidate.id),
-            numbers.join("; ")
-        );
         if found.as_ref().is_none_or(|(least, ..)| gain < *least) {
             found = Some((gain, index, words));
         }

@@ -13,6 +13,8 @@ pub(super) struct Waves {
     pub(super) candidates: Vec<Candidate>,
     /// Above 1 they add the wave `other` with an amplitude of what they exceed 1 by.
     pub(super) resolutions: Vec<f64>,
+    /// Constants within this are within the error of the discretisation.
+    pub(super) tolerance: f64,
 }
 
 const VALUES: usize = 400;
@@ -28,6 +30,27 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
     }
 }
 
+/// What a cause does; `limit` takes what is above 1/x from the wave `other` with an amplitude of 3.
+fn part(id: &str, x: f64, run: usize, at: usize) -> f64 {
+    if id == "limit" { -(3.0 * wave("other", run, at) - 1.0 / x).max(0.0) } else { x * wave(id, run, at) }
+}
+
+/// A cause with one parameter, 0 for none.
+pub(super) fn candidate(id: &'static str) -> Candidate {
+    Candidate {
+        id,
+        kind: "test",
+        cause: "A wave.",
+        places: vec!["test"],
+        is_free_form: false,
+        is_variant: false,
+        is_constant: false,
+        parameters: vec![Free { name: "x", unit: "", off: Some(0.0), bounds: [-100.0, 100.0], scale: 1.0, inverse: false }],
+        fixed: Vec::new(),
+        starts: vec![vec![1.0]],
+    }
+}
+
 impl Waves {
     pub(super) fn new(of: &[(&str, f64)]) -> Self {
         let signal = |run: usize| {
@@ -35,7 +58,7 @@ impl Waves {
                 let noise = (1.0 + (run * VALUES + at) as f64).sin() * 43_758.545_3;
                 // Uniform noise of unit variance.
                 let noise = (noise - noise.floor() - 0.5) * 12_f64.sqrt();
-                of.iter().map(|(id, x)| x * wave(id, run, at)).sum::<f64>() + noise
+                of.iter().map(|(id, x)| part(id, *x, run, at)).sum::<f64>() + noise
             };
             Signal {
                 id: format!("run {run}"),
@@ -47,18 +70,6 @@ impl Waves {
                 ..Signal::default()
             }
         };
-        let candidate = |id: &'static str| Candidate {
-            id,
-            kind: "test",
-            cause: "A wave.",
-            places: vec!["test"],
-            is_free_form: false,
-            is_variant: false,
-            is_constant: false,
-            parameters: vec![Free { name: "x", unit: "", off: Some(0.0), bounds: [-100.0, 100.0], scale: 1.0, inverse: false }],
-            fixed: Vec::new(),
-            starts: vec![vec![1.0]],
-        };
         let mut candidates = ["other", "first", "second"].map(candidate).to_vec();
         // Another law of the second cause, with a part of the other one.
         let mut variant = candidate("second");
@@ -66,7 +77,7 @@ impl Waves {
         variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
         variant.starts = vec![vec![1.0, 1.0]];
         candidates.push(variant);
-        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0] }
+        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0], tolerance: 0.0 }
     }
 }
 
@@ -90,11 +101,15 @@ impl Plant for Waves {
     fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let of = |term: &Term, at| {
             let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
-            term.x[0] * wave(self.candidates[term.candidate].id, run, at) + more
+            part(self.candidates[term.candidate].id, term.x[0], run, at) + more
         };
         let finer = model.resolution - 1.0;
         let value = |at| model.terms.iter().map(|term| of(term, at)).sum::<f64>() + finer * wave("other", run, at);
         Ok((0..VALUES).map(value).collect())
+    }
+
+    fn is_credible(&self, term: &Term, _resolution: f64) -> bool {
+        !self.candidates[term.candidate].is_constant || term.x[0].abs() > self.tolerance
     }
 
     fn resolutions(&self) -> Vec<f64> {
