@@ -16,8 +16,6 @@ use super::verdict::Judged;
 const MINOR_SHARE: f64 = 0.02;
 /// ... those that remove less than this of χ² per value: half the noise, ...
 const MINOR_MISFIT: f64 = VISIBLE;
-/// ... those beside a larger one that remove less than this multiple of what all causes leave: they may be what the laws of the others do not follow, ...
-const LEAST_TO_LEFT: f64 = 3.0;
 /// ... and those that are chosen in a smaller share of resamples, unless they are tied.
 const LEAST_STABILITY: f64 = 0.8;
 
@@ -148,7 +146,7 @@ pub(super) fn adopted(
         effects.push(effect);
     }
     let first = effects.len() - terms.len();
-    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < least_taken(whole.left);
+    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < MINOR_MISFIT;
     let small: Vec<usize> = (0..terms.len()).filter(is_small).collect();
     for Needed { index, own, instead } in needed_together(search, best, &whole, small) {
         taken[first + index] = own;
@@ -157,7 +155,7 @@ pub(super) fn adopted(
         let instead: Vec<&str> = instead.iter().map(|other| search.id(terms[*other].candidate)).collect();
         tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
-    set_roles(&mut effects, &taken, whole.left);
+    set_roles(&mut effects, &taken, search.above(best));
     let pairs = weighed.into_iter().flat_map(|weighed| weighed.pairs).collect();
     Ok(Adoption { effects, unseen, pairs })
 }
@@ -199,8 +197,6 @@ struct Whole {
     bare: f64,
     /// Left by the refined nominal model with re-tuned constants.
     tuned: f64,
-    /// Left by the model with all causes, above 1.
-    left: f64,
 }
 
 impl Whole {
@@ -209,7 +205,7 @@ impl Whole {
         let tuned = search.fitted_at_its_spread(&tuned)?;
         let count = search.estimator.count(&search.split.all()) as f64;
         let left = |scored: &Scored| ((search.chi2(scored) - search.chi2(best)) / count).max(f64::MIN_POSITIVE);
-        Ok(Self { bare: left(bare), tuned: left(&tuned), left: search.above(best) })
+        Ok(Self { bare: left(bare), tuned: left(&tuned) })
     }
 
     /// The share of term `index`, which removes `own` (χ² per value), of what re-tuned constants leave. Constants among themselves, which leave nothing, share what the
@@ -258,7 +254,7 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
         let Some((at, least)) = shorter.min_by(|a, b| a.1.total().total_cmp(&b.1.total())) else { break };
         let index = small.remove(at);
         let own = (search.chi2(&least) - search.chi2(&rest)).max(0.0) / count;
-        if own >= least_taken(whole.left) && whole.share(search, best, index, own) > MINOR_SHARE {
+        if own >= MINOR_MISFIT && whole.share(search, best, index, own) > MINOR_SHARE {
             let is_one = left_out.len() == 1;
             let instead = left_out.iter().copied().filter(|other| is_one || is_instead(other, index)).collect();
             needed.push(Needed { index, own, instead });
@@ -270,23 +266,18 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
     needed
 }
 
-/// What a cause beside a larger one has to remove where this is `left` by all (χ² per value).
-fn least_taken(left: f64) -> f64 {
-    MINOR_MISFIT.max(LEAST_TO_LEFT * left)
-}
-
 /// Sets the roles of causes, from their shares, what each removes and what is `left` by all (χ² per value).
 fn set_roles(effects: &mut [Adopted], taken: &[f64], left: f64) {
     let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
     order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
-    let (most, mut sum) = (taken.iter().copied().fold(0.0, f64::max), 0.0);
+    let mut sum = 0.0;
     let is_convention = is_gain_a_convention(effects, left);
     for k in order {
         sum += effects[k].share;
         let effect = &mut effects[k];
         // A tied one says what else may be chosen.
         let is_unstable = effect.stability.is_some_and(|share| share < LEAST_STABILITY) && effect.tied_with.is_empty();
-        let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT || taken[k] < least_taken(left).min(most);
+        let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT;
         if is_small || is_unstable || (is_convention && effect.id == "actuation-gain") {
             effect.role = Part::Minor;
         }
@@ -374,10 +365,6 @@ mod tests {
         let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
         set_roles(&mut within_the_noise, &[0.2], 0.0);
         assert_eq!(within_the_noise[0].role, Minor);
-        // Both take less than three times what is left, the first one most of all.
-        let mut beside = [0.6, 0.4].map(|share| cause("a", share, Some(1.0), &[]));
-        set_roles(&mut beside, &[5.0, 4.0], 2.0);
-        assert_eq!(beside.map(|effect| effect.role), [Cause, Minor]);
     }
 
     #[test]
