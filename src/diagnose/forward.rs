@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::DiagnoseError;
 use super::fit::{Convergence, sum_of_squares};
+use super::naming::is_of;
 use super::search::{LEAST_BIC, Scored, Screened, Search, Trial};
 
 /// Candidates that are fitted after screening, named ones and free forms.
@@ -46,20 +47,33 @@ impl Search<'_> {
 
     /// The trial to adopt: a free form where it is closer than the best name, so that what the name leaves goes to no other cause. Of several such forms, which have
     /// about as many weights, the least costly on all runs: memories of the joints, of the voltage and of the driver differ by little on the select runs alone.
+    /// Names of its place are tried with their other laws first: a free form is linear in its weights, and what it misses of a law that is not goes to other causes.
     fn top(&self, trials: &[Trial]) -> Option<Scored> {
         let (free, named): (Vec<&Scored>, Vec<&Scored>) =
             trials.iter().map(|trial| &trial.scored).partition(|scored| self.ends_free(scored.model()));
-        let named = named.first().copied();
-        let closer = free.into_iter().filter(|free| named.is_none_or(|named| self.is_closer(free, named)));
-        let free = closer.min_by(|a, b| self.cost(a).total_cmp(&self.cost(b)));
-        match (named.cloned(), free.cloned()) {
-            (Some(named), Some(free)) => {
-                let last = named.model().terms.len() - 1;
-                let named = self.with_its_law(named, last);
-                Some(if self.is_closer(&free, &named) { free } else { named })
-            }
-            (named, free) => named.or(free),
-        }
+        let first = named.first().copied();
+        let closer = free.into_iter().filter(|free| first.is_none_or(|named| self.is_closer(free, named)));
+        let Some(free) = closer.min_by(|a, b| self.cost(a).total_cmp(&self.cost(b))) else {
+            return first.cloned();
+        };
+        let rivals = named.iter().enumerate().filter(|(at, named)| *at == 0 || self.are_of_one_place(free, named));
+        Some(self.or_a_name(free.clone(), rivals.map(|(_, named)| (*named).clone())))
+    }
+
+    /// A model that ends with a free form, or the best of `named` with their other laws if the free form is not closer.
+    fn or_a_name(&self, free: Scored, named: impl Iterator<Item = Scored>) -> Scored {
+        let lawful = named.map(|named| {
+            let last = named.model().terms.len() - 1;
+            self.with_its_law(named, last)
+        });
+        let best = lawful.min_by(|a, b| self.judged(a).total_cmp(&self.judged(b)));
+        best.filter(|best| !self.is_closer(&free, best)).unwrap_or(free)
+    }
+
+    /// True if the last term of a model acts at a place of another one's last term, a free form.
+    fn are_of_one_place(&self, free: &Scored, other: &Scored) -> bool {
+        let last = |scored: &Scored| scored.model().terms.last().cloned();
+        last(free).zip(last(other)).is_some_and(|(free, other)| is_of(self, &free, &other))
     }
 
     /// A model with all that suits it better: nuisances, discretisation and laws, before another cause could take their errors; another law of its last cause, and
@@ -183,9 +197,16 @@ impl Search<'_> {
         self.split.fit.retain(|other| *other != run);
         self.split.select.push(run);
         self.split.select.sort_unstable();
-        if let (Ok(plain), Ok(with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
+        if let (Ok(plain), Ok(mut with)) = (self.fitted(base.model()), self.fitted(trial.scored.model()))
             && self.is_worth(&with, &plain)
         {
+            if self.ends_free(with.model()) {
+                let of_place = trials
+                    .iter()
+                    .filter(|other| !self.ends_free(other.scored.model()) && self.are_of_one_place(&with, &other.scored));
+                let rivals: Vec<Scored> = of_place.filter_map(|other| self.ranked(other.scored.model()).ok()).collect();
+                with = self.or_a_name(with, rivals.into_iter());
+            }
             *base = plain;
             return Some(with);
         }

@@ -300,7 +300,7 @@ fn is_of_place(search: &Search, free: &Term, candidate: &Candidate) -> bool {
 }
 
 /// True if a term acts at a place of the free form.
-fn is_of(search: &Search, free: &Term, term: &Term) -> bool {
+pub(super) fn is_of(search: &Search, free: &Term, term: &Term) -> bool {
     is_of_place(search, free, search.candidate(term))
 }
 
