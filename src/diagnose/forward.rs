@@ -29,9 +29,12 @@ impl Search<'_> {
                 break;
             }
             let (trials, screened) = self.trials(&best)?;
-            let worthy = match self.top(&trials).filter(|top| self.is_worth(top, &best)) {
-                Some(top) => Some(top),
-                None => self.seen_by_fit_runs(&mut best, &trials).or_else(|| self.both(&screened, &best)),
+            let worthy = match self.top(&trials) {
+                Some(top) if self.is_worth(&top, &best) => Some(top),
+                top => top
+                    .and_then(|top| self.worth_once_settled(top, &best))
+                    .or_else(|| self.seen_by_fit_runs(&mut best, &trials))
+                    .or_else(|| self.both(&screened, &best)),
             };
             first.get_or_insert(trials);
             let Some(worthy) = worthy else { break };
@@ -183,6 +186,22 @@ impl Search<'_> {
         }
         let both = self.ranked_beyond(&pair, screened).ok().filter(|both| self.is_worth(both, base))?;
         self.fitted(both.model()).ok()
+    }
+
+    /// A trial that takes much, but leaves so much that this may be chance, with nuisance parameters of its own: those of the model without a slew rate are far from those
+    /// with it.
+    fn worth_once_settled(&mut self, trial: Scored, base: &Scored) -> Option<Scored> {
+        if !self.takes_much(&trial, base) {
+            return None;
+        }
+        let name = trial.model().terms.last().map_or("nothing", |term| self.id(term.candidate));
+        (self.progress)(&format!("{name} with times and zeros of its own"));
+        let before = self.estimator.state();
+        let settled = self.settle(trial).ok().filter(|settled| self.is_worth(settled, base));
+        if settled.is_none() {
+            self.estimator.restore(before);
+        }
+        settled
     }
 
     /// A cause, or a free form, that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it

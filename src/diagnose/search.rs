@@ -442,8 +442,13 @@ impl Search<'_> {
 
     /// True if `more` is worth its additional parameters over `less`.
     pub fn is_worth(&self, more: &Scored, less: &Scored) -> bool {
+        self.takes_much(more, less) && self.is_significant(more, less)
+    }
+
+    /// True if χ² of the select runs falls by as much from `less` to `more` as is worth a cause.
+    pub(super) fn takes_much(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };
-        self.gap(more, less, runs).1 > self.worth(runs) && self.is_significant(more, less)
+        self.gap(more, less, runs).1 > self.worth(runs)
     }
 
     /// The least fall of χ² of `runs` for which a cause is adopted.
