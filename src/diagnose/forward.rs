@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::DiagnoseError;
 use super::fit::{Convergence, sum_of_squares};
 use super::naming::is_of;
-use super::search::{LEAST_BIC, Scored, Screened, Search, Trial};
+use super::search::{LEAST_BIC, Scored, Screened, Search, Trial, VISIBLE};
 
 /// Candidates that are fitted after screening, named ones and free forms.
 const FINALISTS: usize = 7;
@@ -93,7 +93,28 @@ impl Search<'_> {
         for index in 0..last {
             best = self.with_its_plain_law(best, index);
         }
-        Some(if best.model().terms.is_empty() { best } else { self.with_its_law(best, last) })
+        Some(if best.model().terms.is_empty() { best } else { self.with_its_law_once_settled(best, last) })
+    }
+
+    /// [`with_its_law`](Self::with_its_law), and where much is left, with nuisance parameters of each law: times of jumps that suit the plain one hide another.
+    fn with_its_law_once_settled(&mut self, scored: Scored, index: usize) -> Scored {
+        let scored = self.with_its_law(scored, index);
+        let has_shares = self.estimator.nuisances.iter().any(|nuisance| !nuisance.shares.is_empty());
+        if !has_shares || self.above(&scored) <= VISIBLE || self.candidate(&scored.model().terms[index]).is_variant {
+            return scored;
+        }
+        let mut best = (self.estimator.state(), scored);
+        for model in self.other_laws(best.1.model(), index) {
+            let before = self.estimator.state();
+            (self.progress)(&format!("another law of {} with times and zeros of its own", self.id(model.terms[index].candidate)));
+            let settled = self.ranked(&model).and_then(|ranked| self.settle(ranked));
+            if let Some(other) = settled.ok().filter(|other| self.is_significant(other, &best.1)) {
+                best = (self.estimator.state(), other);
+            }
+            self.estimator.restore(before);
+        }
+        self.estimator.restore(best.0);
+        best.1
     }
 
     /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
