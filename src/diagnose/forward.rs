@@ -100,8 +100,15 @@ impl Search<'_> {
     fn with_its_law_once_settled(&mut self, scored: Scored, index: usize) -> Scored {
         let scored = self.with_its_law(scored, index);
         let has_shares = self.estimator.nuisances.iter().any(|nuisance| !nuisance.shares.is_empty());
-        if !has_shares || self.above(&scored) <= VISIBLE || self.candidate(&scored.model().terms[index]).is_variant {
+        if !has_shares || self.above(&scored) <= VISIBLE {
             return scored;
+        }
+        let before = self.estimator.state();
+        if self.candidate(&scored.model().terms[index]).is_variant {
+            return self.settle(scored.clone()).unwrap_or_else(|_| {
+                self.estimator.restore(before);
+                scored
+            });
         }
         let mut best = (self.estimator.state(), scored);
         for model in self.other_laws(best.1.model(), index) {
@@ -277,5 +284,49 @@ mod tests {
         // One that leaves more than the name on select runs, the least on all, is not.
         assert_eq!(adopted(&[trial(1, 900.0, 1800.0), named.clone(), trial(2, 1010.0, 1500.0)]), 1);
         assert_eq!(adopted(&[named, trial(2, 1010.0, 1500.0)]), 0);
+    }
+
+    #[test]
+    fn names_of_a_place_are_tried_with_their_other_laws_before_its_free_form() {
+        let mut plant = Waves::new(&[("second", 5.0), ("other", 2.0)]);
+        plant.candidates[1].is_free_form = true;
+        let search = search(&plant);
+        let trial = |candidate: usize| {
+            let model = Model::new(vec![Term { candidate, x: vec![1.0] }], 1.0, false);
+            Trial { candidate, scored: search.fitted(&model).unwrap() }
+        };
+        let named = trial(2);
+        for (gain, adopted) in [(0.5, 3), (3.0, 1)] {
+            // The other law takes about 2 per value.
+            let by = |runs: &[usize]| gain * search.estimator.count(runs) as f64;
+            let mut free = trial(1);
+            free.scored.select = named.scored.select - by(&search.split.select);
+            free.scored.fitted = named.scored.fitted - by(&search.split.fit);
+            let top = search.top(&[free, named.clone()]).unwrap();
+            assert_eq!(top.model().terms[0].candidate, adopted, "{gain}");
+        }
+    }
+
+    #[test]
+    fn causes_and_laws_are_judged_with_nuisance_parameters_of_their_own() {
+        // With the shares of the model without it, a cause leaves far more than it takes.
+        let mut plant = Waves::new(&[("other", 3.0), ("late", 12.0)]);
+        plant.lateness = 4.0;
+        plant.candidates.truncate(1);
+        let mut cause = search(&plant);
+        let plain = cause.calibrated(1.0).unwrap();
+        let (best, _) = cause.forward(plain).unwrap();
+        assert_eq!(best.model().terms.len(), 1);
+        assert!(cause.estimator.shares().amax() < 0.1, "{}", cause.estimator.shares());
+        // So does another law, or one that is adopted with those of the plain one.
+        for lateness in [4.0, 12.0] {
+            let mut plant = Waves::new(&[("second", 5.0), ("other", 3.0), ("late", 3.0 * lateness)]);
+            plant.lateness = lateness;
+            let mut law = search(&plant);
+            let plain = law.fitted(&Model::new(vec![Term { candidate: 2, x: vec![1.0] }], 1.0, false)).unwrap();
+            let settled = law.settled(plain).unwrap();
+            assert_eq!(settled.model().terms[0].candidate, 3);
+            assert!(law.above(&settled) < VISIBLE, "{lateness}: {}", law.above(&settled));
+        }
     }
 }

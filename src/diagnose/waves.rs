@@ -15,6 +15,8 @@ pub(super) struct Waves {
     pub(super) resolutions: Vec<f64>,
     /// Constants within this are within the error of the discretisation.
     pub(super) tolerance: f64,
+    /// Amplitude of the wave `late` that a share of 0 adds to a model, per amplitude of its wave `other`; 0 for runs without shares.
+    pub(super) lateness: f64,
 }
 
 const VALUES: usize = 400;
@@ -26,6 +28,7 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
         "second" => -(7.0 * t + 0.12).sin(),
         // Hidden in the first run only.
         "once" if run > 0 => 0.0,
+        "late" => (3.0 * t).cos(),
         _ => (23.0 * t).cos(),
     }
 }
@@ -77,7 +80,7 @@ impl Waves {
         variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
         variant.starts = vec![vec![1.0, 1.0]];
         candidates.push(variant);
-        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0], tolerance: 0.0 }
+        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0], tolerance: 0.0, lateness: 0.0 }
     }
 }
 
@@ -98,13 +101,24 @@ impl Plant for Waves {
         &self.candidates
     }
 
-    fn predict(&self, model: &Model, run: usize, _nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
+    fn nuisances(&self, _run: usize) -> usize {
+        usize::from(self.lateness > 0.0)
+    }
+
+    fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let of = |term: &Term, at| {
             let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
             part(self.candidates[term.candidate].id, term.x[0], run, at) + more
         };
         let finer = model.resolution - 1.0;
-        let value = |at| model.terms.iter().map(|term| of(term, at)).sum::<f64>() + finer * wave("other", run, at);
+        let own = |term: &Term| if self.candidates[term.candidate].id == "other" { term.x[0] } else { 0.0 };
+        let other = |term: &Term| own(term) + term.x.get(1).unwrap_or(&0.0);
+        let late = nuisance.shares.first().map_or(0.0, |share| (1.0 - share) * self.lateness);
+        let late = late * model.terms.iter().map(other).sum::<f64>();
+        let value = |at| {
+            let terms = model.terms.iter().map(|term| of(term, at)).sum::<f64>();
+            terms + finer * wave("other", run, at) + late * wave("late", run, at)
+        };
         Ok((0..VALUES).map(value).collect())
     }
 
