@@ -125,7 +125,7 @@ impl Search<'_> {
     }
 
     /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
-    fn with_its_law(&self, scored: Scored, index: usize) -> Scored {
+    pub(super) fn with_its_law(&self, scored: Scored, index: usize) -> Scored {
         let own = self.candidate(&scored.model().terms[index]);
         if own.is_variant {
             return self.with_its_plain_law(scored, index);

@@ -960,12 +960,17 @@ impl Search<'_> {
             let is_likely = |at: usize, c: &Candidate| at != removed.candidate && (likely.contains(&at) || is_law(c));
             let screened = self.screened(&without, &self.responses(without.model(), is_likely)?, None);
             let promising = screened.ranked.iter().filter(|(gain, _)| *gain >= PROMISING_IN_PLACE * own);
-            // Other laws of another cause are tried once it has the place.
+            // Other laws of another cause are tried where its plain one is nearly as good, or once it has the place.
             for model in first_of_each(promising, most, |term| self.id(term.candidate)) {
                 let Some(candidate) = model.terms.last().map(|term| term.candidate) else { continue };
-                if let Ok(scored) = self.ranked_beyond(&model, &screened) {
-                    found.push((removed.candidate, Trial { candidate, scored: self.in_its_resolution(scored, best) }));
+                let Ok(scored) = self.ranked_beyond(&model, &screened) else { continue };
+                let scored = self.in_its_resolution(scored, best);
+                if self.is_nearly(&scored, best) && !self.estimator.plant.candidates()[candidate].is_variant {
+                    let lawful = self.with_its_law(scored.clone(), model.terms.len() - 1);
+                    let law = lawful.model().terms.last().map(|term| term.candidate).filter(|law| *law != candidate);
+                    found.extend(law.map(|candidate| (removed.candidate, Trial { candidate, scored: lawful })));
                 }
+                found.push((removed.candidate, Trial { candidate, scored }));
             }
         }
         Ok(found)
@@ -986,11 +991,15 @@ impl Search<'_> {
         models.filter_map(trial).collect()
     }
 
-    /// A replacement in the discretisation that suits it, if it leaves little more than `best`, which leaves something: that of `best` may stand for what a wrong
-    /// cause lacks.
+    /// A replacement in the discretisation that suits it, if it is nearly as good as `best`, the discretisation of which may stand for what a wrong cause lacks.
     fn in_its_resolution(&self, trial: Scored, best: &Scored) -> Scored {
+        if self.is_nearly(&trial, best) { self.resolve(trial, Convergence::Rank) } else { trial }
+    }
+
+    /// True if a replacement leaves little more than `best`, which leaves something.
+    fn is_nearly(&self, trial: &Scored, best: &Scored) -> bool {
         let left = self.above(best);
-        if left > LEAST_GAIN && self.above(&trial) < NEARLY * left { self.resolve(trial, Convergence::Rank) } else { trial }
+        left > LEAST_GAIN && self.above(trial) < NEARLY * left
     }
 
     /// The discretisation with the least χ² over all runs, by steps from the present one. To rank models, steps end where they lower χ² by less than half
@@ -1186,6 +1195,17 @@ mod tests {
         let replaced = search.replacements(&best, 1).unwrap();
         let law = replaced.iter().find(|(removed, trial)| (*removed, trial.candidate) == (0, 3));
         assert!((law.unwrap().1.scored.total() - best.total()).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_law_with_a_further_parameter_is_tried_in_the_place_of_a_cause_where_the_plain_one_is_nearly_as_good() {
+        let plant = Waves::new(&[("second", 5.0), ("other", 1.0)]);
+        let search = search(&plant);
+        let best = search.fitted(&Model::new(vec![Term { candidate: 1, x: vec![1.0] }], 1.0, false)).unwrap();
+        let replaced = search.replacements(&best, 1).unwrap();
+        let [plain, law] =
+            [2, 3].map(|of| replaced.iter().find(|(removed, trial)| (*removed, trial.candidate) == (1, of)).unwrap());
+        assert!(search.above(&plain.1.scored) > 0.4 && search.above(&law.1.scored) < 0.1, "{replaced:?}");
     }
 
     #[test]
