@@ -59,35 +59,31 @@ impl Search<'_> {
         let Some(free) = closer.min_by(|a, b| self.cost(a).total_cmp(&self.cost(b))) else {
             return first.cloned();
         };
-        let rivals = named.iter().enumerate().filter(|(at, named)| *at == 0 || self.are_of_one_place(free, named));
+        let rivals = named.iter().enumerate().filter(|(at, named)| *at == 0 || self.is_name_of(free, named));
         Some(self.or_a_name(free.clone(), rivals.map(|(_, named)| (*named).clone())))
     }
 
     /// A model that ends with a free form, or the best of `named` with their other laws if the free form is not closer.
     fn or_a_name(&self, free: Scored, named: impl Iterator<Item = Scored>) -> Scored {
-        let lawful = named.map(|named| {
+        let with_laws = named.map(|named| {
             let last = named.model().terms.len() - 1;
             self.with_its_law(named, last)
         });
-        let best = lawful.min_by(|a, b| self.judged(a).total_cmp(&self.judged(b)));
+        let best = with_laws.min_by(|a, b| self.judged(a).total_cmp(&self.judged(b)));
         best.filter(|best| !self.is_closer(&free, best)).unwrap_or(free)
     }
 
-    /// True if the last term of a model acts at a place of another one's last term, a free form.
-    fn are_of_one_place(&self, free: &Scored, other: &Scored) -> bool {
-        let last = |scored: &Scored| scored.model().terms.last().cloned();
-        last(free).zip(last(other)).is_some_and(|(free, other)| is_of(self, &free, &other))
+    /// True if the last term of a model is a named cause of the place of the free form that `free` ends with.
+    fn is_name_of(&self, free: &Scored, other: &Scored) -> bool {
+        let [free, last] = [free, other].map(|scored| scored.model().terms.last());
+        !self.ends_free(other.model()) && free.zip(last).is_some_and(|(free, last)| is_of(self, free, last))
     }
 
     /// A model with all that suits it better: nuisances, discretisation and laws, before another cause could take their errors; another law of its last cause, and
     /// the plain one of those before where the other one is no longer needed. None if some run cannot be simulated with it: then it is no model, and
     /// everything is as before.
     fn settled(&mut self, model: Scored) -> Option<Scored> {
-        let before = self.estimator.state();
-        let Ok(settled) = self.settle(model) else {
-            self.estimator.restore(before);
-            return None;
-        };
+        let settled = self.settled_if(model, |_, _| true)?;
         let mut best = self.resolve(settled, Convergence::Rank);
         let last = best.model().terms.len().saturating_sub(1);
         for index in 0..last {
@@ -103,25 +99,33 @@ impl Search<'_> {
         if !has_shares || self.above(&scored) <= VISIBLE {
             return scored;
         }
-        let before = self.estimator.state();
         if self.candidate(&scored.model().terms[index]).is_variant {
-            return self.settle(scored.clone()).unwrap_or_else(|_| {
-                self.estimator.restore(before);
-                scored
-            });
+            return self.settled_if(scored.clone(), |_, _| true).unwrap_or(scored);
         }
-        let mut best = (self.estimator.state(), scored);
-        for model in self.other_laws(best.1.model(), index) {
-            let before = self.estimator.state();
+        // Each law begins with those of the plain one.
+        let before = self.estimator.state();
+        let laws = self.other_laws(scored.model(), index);
+        let mut best = (before.clone(), scored);
+        for model in laws {
             (self.progress)(&format!("another law of {} with times and zeros of its own", self.id(model.terms[index].candidate)));
-            let settled = self.ranked(&model).and_then(|ranked| self.settle(ranked));
-            if let Some(other) = settled.ok().filter(|other| self.is_significant(other, &best.1)) {
+            self.estimator.restore(before.clone());
+            let Ok(ranked) = self.ranked(&model) else { continue };
+            if let Some(other) = self.settled_if(ranked, |search, other| search.is_significant(other, &best.1)) {
                 best = (self.estimator.state(), other);
             }
-            self.estimator.restore(before);
         }
         self.estimator.restore(best.0);
         best.1
+    }
+
+    /// A model with nuisance parameters of its own, if it can be simulated with them and `is_wanted`; otherwise they are as before.
+    fn settled_if(&mut self, model: Scored, is_wanted: impl Fn(&Self, &Scored) -> bool) -> Option<Scored> {
+        let before = self.estimator.state();
+        let settled = self.settle(model).ok().filter(|settled| is_wanted(self, settled));
+        if settled.is_none() {
+            self.estimator.restore(before);
+        }
+        settled
     }
 
     /// The model with another law of the cause of term `index`, if that is significantly better, or with the plain law if the one that it has is not.
@@ -224,16 +228,11 @@ impl Search<'_> {
         }
         let name = trial.model().terms.last().map_or("nothing", |term| self.id(term.candidate));
         (self.progress)(&format!("{name} with times and zeros of its own"));
-        let before = self.estimator.state();
-        let settled = self.settle(trial).ok().filter(|settled| self.is_worth(settled, base));
-        if settled.is_none() {
-            self.estimator.restore(before);
-        }
-        settled
+        self.settled_if(trial, |search, settled| search.is_worth(settled, base))
     }
 
     /// A cause, or a free form, that shows in fit runs only: the run that it improves most is selected on as well, and the cause, fitted to the others, has to improve it
-    /// too. Keeps the new split if it does.
+    /// too. Keeps the new split if it does. In the place of a free form a name counts as in [`top`](Self::top).
     fn seen_by_fit_runs(&mut self, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
         let trial = trials.iter().min_by(|a, b| a.scored.bic().total_cmp(&b.scored.bic()))?;
         let gain = |run: &usize| sum_of_squares(&base.residuals[*run]) - sum_of_squares(&trial.scored.residuals[*run]);
@@ -248,10 +247,8 @@ impl Search<'_> {
             && self.is_worth(&with, &plain)
         {
             if self.ends_free(with.model()) {
-                let of_place = trials
-                    .iter()
-                    .filter(|other| !self.ends_free(other.scored.model()) && self.are_of_one_place(&with, &other.scored));
-                let rivals: Vec<Scored> = of_place.filter_map(|other| self.ranked(other.scored.model()).ok()).collect();
+                let names = trials.iter().map(|other| &other.scored).filter(|other| self.is_name_of(&with, other));
+                let rivals: Vec<Scored> = names.filter_map(|name| self.ranked(name.model()).ok()).collect();
                 with = self.or_a_name(with, rivals.into_iter());
             }
             *base = plain;
@@ -305,6 +302,15 @@ mod tests {
             let top = search.top(&[free, named.clone()]).unwrap();
             assert_eq!(top.model().terms[0].candidate, adopted, "{gain}");
         }
+
+        // Where fit runs alone show it, too: the free form with the least BIC gives way to the law that leaves less.
+        let mut free = trial(1);
+        free.scored.fitted = 0.0;
+        let trials = [free, named];
+        let mut search = search;
+        let mut base = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+        let seen = search.seen_by_fit_runs(&mut base, &trials).unwrap();
+        assert_eq!(seen.model().terms[0].candidate, 3);
     }
 
     #[test]
@@ -328,5 +334,17 @@ mod tests {
             assert_eq!(settled.model().terms[0].candidate, 3);
             assert!(law.above(&settled) < VISIBLE, "{lateness}: {}", law.above(&settled));
         }
+    }
+
+    #[test]
+    fn nuisance_parameters_of_a_model_that_is_not_wanted_are_not_kept() {
+        let mut plant = Waves::new(&[("other", 3.0), ("late", 12.0)]);
+        plant.lateness = 4.0;
+        let mut search = search(&plant);
+        let model = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![1.0] }], 1.0, false)).unwrap();
+        let before = search.estimator.shares();
+        assert!(search.settled_if(model.clone(), |_, _| false).is_none());
+        assert_eq!(search.estimator.shares(), before);
+        assert!(search.settled_if(model, |_, _| true).is_some() && search.estimator.shares() != before);
     }
 }

@@ -965,10 +965,10 @@ impl Search<'_> {
                 let Some(candidate) = model.terms.last().map(|term| term.candidate) else { continue };
                 let Ok(scored) = self.ranked_beyond(&model, &screened) else { continue };
                 let scored = self.in_its_resolution(scored, best);
-                if self.is_nearly(&scored, best) && !self.estimator.plant.candidates()[candidate].is_variant {
-                    let lawful = self.with_its_law(scored.clone(), model.terms.len() - 1);
-                    let law = lawful.model().terms.last().map(|term| term.candidate).filter(|law| *law != candidate);
-                    found.extend(law.map(|candidate| (removed.candidate, Trial { candidate, scored: lawful })));
+                if self.is_nearly_as_good(&scored, best) && !self.estimator.plant.candidates()[candidate].is_variant {
+                    let other = self.with_its_law(scored.clone(), model.terms.len() - 1);
+                    let law = other.model().terms.last().map(|term| term.candidate).filter(|law| *law != candidate);
+                    found.extend(law.map(|candidate| (removed.candidate, Trial { candidate, scored: other })));
                 }
                 found.push((removed.candidate, Trial { candidate, scored }));
             }
@@ -993,11 +993,11 @@ impl Search<'_> {
 
     /// A replacement in the discretisation that suits it, if it is nearly as good as `best`, the discretisation of which may stand for what a wrong cause lacks.
     fn in_its_resolution(&self, trial: Scored, best: &Scored) -> Scored {
-        if self.is_nearly(&trial, best) { self.resolve(trial, Convergence::Rank) } else { trial }
+        if self.is_nearly_as_good(&trial, best) { self.resolve(trial, Convergence::Rank) } else { trial }
     }
 
     /// True if a replacement leaves little more than `best`, which leaves something.
-    fn is_nearly(&self, trial: &Scored, best: &Scored) -> bool {
+    fn is_nearly_as_good(&self, trial: &Scored, best: &Scored) -> bool {
         let left = self.above(best);
         left > LEAST_GAIN && self.above(trial) < NEARLY * left
     }
