@@ -31,9 +31,10 @@ impl Search<'_> {
             let (trials, screened) = self.trials(&best)?;
             let worthy = match self.top(&trials) {
                 Some(top) if self.is_worth(&top, &best) => Some(top),
-                top => top
-                    .and_then(|top| self.worth_once_settled(top, &best))
-                    .or_else(|| self.seen_by_fit_runs(&mut best, &trials))
+                // Another split first: with nuisance parameters of its own a cause that does a part of another one's work may be worth it, as a delay in the place of a lag.
+                top => self
+                    .seen_by_fit_runs(&mut best, &trials)
+                    .or_else(|| self.worth_once_settled(top?, &best))
                     .or_else(|| self.both(&screened, &best)),
             };
             first.get_or_insert(trials);
