@@ -111,7 +111,7 @@ impl Search<'_> {
             (self.progress)(&format!("another law of {} with times and zeros of its own", self.id(model.terms[index].candidate)));
             self.estimator.restore(before.clone());
             let Ok(ranked) = self.ranked(&model) else { continue };
-            if let Some(other) = self.settled_if(ranked, |search, other| search.is_significant(other, &best.1)) {
+            if let Some(other) = self.settled_if(ranked, |search, other| search.is_shown(other, &best.1)) {
                 best = (self.estimator.state(), other);
             }
         }
@@ -139,13 +139,13 @@ impl Search<'_> {
         for model in self.other_laws(scored.model(), index) {
             (self.progress)(&format!("another law of {}", own.id));
             let Ok(other) = self.ranked(&model) else { continue };
-            if best.as_ref().is_none_or(|best| self.judged(&other) < self.judged(best)) {
+            if best.as_ref().is_none_or(|best| other.total() < best.total()) {
                 best = Some(other);
             }
         }
         // One that is no better so far is not fitted to the end, and one that cannot be is none.
         let best = best.filter(|best| best.total() < scored.total()).and_then(|best| self.fitted(best.model()).ok());
-        best.filter(|best| self.is_significant(best, &scored)).unwrap_or(scored)
+        best.filter(|best| self.is_shown(best, &scored)).unwrap_or(scored)
     }
 
     /// The best screened candidates fitted on top of `from`, best on select runs first, and the screening.

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::blocks::blocks;
 use super::fit::{Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
+use super::naming::LEAST_TAKEN;
 use super::noise;
 use super::plant::{Candidate, Free, Model, Term};
 use super::projection::{tangents, without_directions};
@@ -38,8 +39,9 @@ pub(super) const VISIBLE: f64 = 0.25;
 const SEEN_BY_FIT: f64 = 0.1;
 /// A cause whose linear estimate exceeds that by this factor is not left out on trial.
 const CLEARLY: f64 = 3.0;
-/// Two models are tied if their χ² differ by less than this or by less than two standard errors.
+/// Two models are tied if their χ² differ by less than this or by less than these standard errors.
 const TIED_CHI2: f64 = 12.0;
+const TIED_SIGMAS: f64 = 2.0;
 /// Forms of one cause that are fitted after screening.
 const FORMS: usize = 2;
 /// Candidates are fitted in the place of a cause whose linear estimate is at least this share of its own.
@@ -466,6 +468,14 @@ impl Search<'_> {
         self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
     }
 
+    /// True if a further parameter is beyond chance on the select runs, or the fit runs need it and the select runs, which may hardly show it, do not
+    /// speak against it.
+    pub(super) fn is_shown(&self, more: &Scored, less: &Scored) -> bool {
+        let is_against = || self.gap(less, more, &self.split.select).0 > TIED_SIGMAS;
+        self.is_significant(more, less)
+            || (self.is_seen_by_fit(more, less) && self.is_significant_on(&self.split.fit, more, less) && !is_against())
+    }
+
     /// The candidate of a term.
     pub fn candidate(&self, term: &Term) -> &Candidate {
         &self.estimator.plant.candidates()[term.candidate]
@@ -479,7 +489,7 @@ impl Search<'_> {
     /// True if the runs cannot tell two models apart.
     pub fn is_tied(&self, better: &Scored, other: &Scored) -> bool {
         let (sigmas, gap) = self.gap(better, other, &self.split.all());
-        gap < TIED_CHI2 || sigmas < 2.0
+        gap < TIED_CHI2 || sigmas < TIED_SIGMAS
     }
 
     /// Sets the noise to that of what does not repeat in the residuals of `scored`, if it differs from the present one; true if it does.
@@ -758,7 +768,7 @@ impl Search<'_> {
         let Some(model) = self.plain_law(scored.model(), index) else { return scored };
         (self.progress)(&format!("the plain law of {}", self.id(model.terms[index].candidate)));
         match self.fitted_at_its_spread(&model) {
-            Ok(plain) if !self.is_significant(&scored, &plain) => plain,
+            Ok(plain) if !self.is_shown(&scored, &plain) => plain,
             _ => scored,
         }
     }
@@ -965,7 +975,9 @@ impl Search<'_> {
                 let Some(candidate) = model.terms.last().map(|term| term.candidate) else { continue };
                 let Ok(scored) = self.ranked_beyond(&model, &screened) else { continue };
                 let scored = self.in_its_resolution(scored, best);
-                if self.is_nearly_as_good(&scored, best) && !self.estimator.plant.candidates()[candidate].is_variant {
+                let is_nearly_as_good =
+                    self.is_nearly_as_good(&scored, best) || without.total() - scored.total() > LEAST_TAKEN * own;
+                if is_nearly_as_good && !self.estimator.plant.candidates()[candidate].is_variant {
                     let other = self.with_its_law(scored.clone(), model.terms.len() - 1);
                     let law = other.model().terms.last().map(|term| term.candidate).filter(|law| *law != candidate);
                     found.extend(law.map(|candidate| (removed.candidate, Trial { candidate, scored: other })));
