@@ -155,7 +155,8 @@ pub(super) fn adopted(
         let instead: Vec<&str> = instead.iter().map(|other| search.id(terms[*other].candidate)).collect();
         tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
-    set_roles(&mut effects, &taken, search.above(best));
+    let is_convention = |k: usize| k >= first && search.estimator.plant.is_convention(terms, k - first, search.above(best));
+    set_roles(&mut effects, &taken, is_convention);
     let pairs = weighed.into_iter().flat_map(|weighed| weighed.pairs).collect();
     Ok(Adoption { effects, unseen, pairs })
 }
@@ -266,34 +267,21 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
     needed
 }
 
-/// Sets the roles of causes, from their shares, what each removes and what is `left` by all (χ² per value).
-fn set_roles(effects: &mut [Adopted], taken: &[f64], left: f64) {
+/// Sets the roles of causes, from their shares, what each removes (χ² per value), and whether the value of one is a convention.
+fn set_roles(effects: &mut [Adopted], taken: &[f64], is_convention: impl Fn(usize) -> bool) {
     let mut order: Vec<usize> = (0..effects.len()).filter(|k| effects[*k].id != "discretisation").collect();
     order.sort_by(|a, b| effects[*a].share.total_cmp(&effects[*b].share));
     let mut sum = 0.0;
-    let is_convention = is_gain_a_convention(effects, left);
     for k in order {
         sum += effects[k].share;
         let effect = &mut effects[k];
         // A tied one says what else may be chosen.
         let is_unstable = effect.stability.is_some_and(|share| share < LEAST_STABILITY) && effect.tied_with.is_empty();
         let is_small = sum <= MINOR_SHARE || taken[k] < MINOR_MISFIT;
-        if is_small || is_unstable || (is_convention && effect.id == "actuation-gain") {
+        if is_small || is_unstable || is_convention(k) {
             effect.role = Part::Minor;
         }
     }
-}
-
-/// True if a gain is no cause of its own. What slope of a loop is called its gain is a convention, within the opening of the loop; so is the time at which creep
-/// begins to count where its law leaves more than half the noise, within a decade of it.
-fn is_gain_a_convention(effects: &[Adopted], left: f64) -> bool {
-    let value = |id: &str, name: &str| {
-        let effect = effects.iter().find(|effect| effect.id == id)?;
-        effect.parameters.iter().find(|p| p.name == name).map(|p| p.value)
-    };
-    let creep = value("creep", "per_decade").filter(|_| left > VISIBLE);
-    let open = value("hysteresis", "width").into_iter().chain(creep).fold(0.0, f64::max);
-    value("actuation-gain", "scale").is_some_and(|scale| (scale - 1.0).abs() < open)
 }
 
 /// The refinement as an adopted cause.
@@ -350,7 +338,7 @@ mod tests {
     /// Roles of causes that remove 1 of χ² per value each.
     fn roles(mut effects: Vec<Adopted>) -> Vec<Part> {
         let taken = vec![1.0; effects.len()];
-        set_roles(&mut effects, &taken, 0.0);
+        set_roles(&mut effects, &taken, |_| false);
         effects.iter().map(|effect| effect.role).collect()
     }
 
@@ -363,26 +351,11 @@ mod tests {
         let stabilities = [cause("a", 0.9, Some(0.79), &[]), cause("b", 0.9, Some(0.79), &["c"]), cause("d", 0.9, None, &[])];
         assert_eq!(roles(stabilities.to_vec()), [Minor, Cause, Cause]);
         let mut within_the_noise = [cause("a", 0.9, Some(1.0), &[])];
-        set_roles(&mut within_the_noise, &[0.2], 0.0);
+        set_roles(&mut within_the_noise, &[0.2], |_| false);
         assert_eq!(within_the_noise[0].role, Minor);
-    }
-
-    #[test]
-    fn a_gain_within_a_loop_or_a_decade_of_creep_that_is_not_followed_is_a_convention() {
-        let with = |id: &str, name: &str, value: f64| Adopted {
-            parameters: vec![Estimate { name: name.into(), value, unit: String::new(), ci95: [None; 2], at_bound: false }],
-            ..cause(id, 0.5, None, &[])
-        };
-        let gain = |scale: f64| with("actuation-gain", "scale", scale);
-        for (id, name, left, is_one) in [
-            ("hysteresis", "width", 0.0, true),
-            ("creep", "per_decade", 0.0, false),
-            ("creep", "per_decade", 0.3, true),
-            ("tip-mass", "mass_g", 0.3, false),
-        ] {
-            let is_convention = |scale: f64| is_gain_a_convention(&[gain(scale), with(id, name, 0.05)], left);
-            assert_eq!([1.04, 0.96, 1.06].map(is_convention), [is_one, is_one, false], "{id} {left}");
-        }
+        let mut by_convention = [0.5, 0.5].map(|share| cause("a", share, Some(1.0), &[]));
+        set_roles(&mut by_convention, &[1.0; 2], |k| k == 1);
+        assert_eq!(by_convention.map(|effect| effect.role), [Cause, Minor]);
     }
 
     #[test]

@@ -236,12 +236,12 @@ fn is_better(search: &Search, removed: usize, trial: &Trial, best: &Scored) -> b
     // A law with a further parameter gives way to another cause that does without one and leaves hardly more.
     let has_further = best.model().terms.iter().any(|t| t.candidate == removed && search.candidate(t).is_variant)
         && search.id(trial.candidate) != search.id(removed);
-    let is_worth = |more, less| search.is_worth(more, less) || (search.is_shown(more, less) && search.is_seen_by_fit(more, less));
-    let simpler = other.freedom() < best.freedom() && (search.is_tied(best, other) || (has_further && !is_worth(best, other)));
+    let simpler = other.freedom() < best.freedom()
+        && (search.is_tied(best, other) || (has_further && !search.is_worth_in_place(best, other)));
     // Of tied causes the likelier one leads; more parameters have to be worth it.
     let likelier = other.freedom() <= best.freedom() && other.total() < best.total() - LIKELIER;
     let better = other.total() < best.total() && !search.is_tied(other, best);
-    simpler || likelier || (better && is_worth(other, best))
+    simpler || likelier || (better && search.is_worth_in_place(other, best))
 }
 
 #[cfg(test)]

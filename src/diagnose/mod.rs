@@ -19,6 +19,7 @@ mod blocks;
 mod candidates;
 mod causes;
 pub mod combinations;
+mod conventions;
 mod curve;
 pub mod dataset;
 pub mod diagnosis;

@@ -186,6 +186,12 @@ pub trait Plant: Sync {
         true
     }
 
+    /// True if the value of term `index` is a matter of convention beside the others of a model that leaves `left` (χ² per value above 1): it is no cause of
+    /// its own then.
+    fn is_convention(&self, _terms: &[Term], _index: usize, _left: f64) -> bool {
+        false
+    }
+
     /// The curve of a term that is a free form; none of a named cause.
     fn curve(&self, _term: &Term) -> Option<FreeCurve> {
         None

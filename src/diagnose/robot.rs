@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
+use super::conventions::is_gain_a_convention;
 use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
 use super::kept::Kept;
 use super::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal, Term};
@@ -405,6 +406,12 @@ impl Plant for RobotPlant {
             _ => 0.5 / (resolution * resolution),
         };
         !candidate.is_constant || term.x.iter().any(|x| (x - 1.0).abs() > tolerance)
+    }
+
+    fn is_convention(&self, terms: &[Term], index: usize, left: f64) -> bool {
+        let effects: Result<Vec<Applied>, _> = terms.iter().map(|term| self.applied(term)).collect();
+        self.candidates[terms[index].candidate].id == "actuation-gain"
+            && effects.is_ok_and(|effects| is_gain_a_convention(&effects, left))
     }
 
     fn curve(&self, term: &Term) -> Option<FreeCurve> {

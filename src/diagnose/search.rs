@@ -476,6 +476,14 @@ impl Search<'_> {
             || (self.is_seen_by_fit(more, less) && self.is_significant_on(&self.split.fit, more, less) && !is_against())
     }
 
+    /// True if `more` is worth its additional parameters over `less`, which has another cause in its place: as is worth a cause, or as the fit runs need, or
+    /// beyond chance where `less` leaves no more than another discretisation may.
+    pub(super) fn is_worth_in_place(&self, more: &Scored, less: &Scored) -> bool {
+        self.is_worth(more, less)
+            || (self.is_shown(more, less) && self.is_seen_by_fit(more, less))
+            || (self.above(less) < LEAST_GAIN && self.is_significant_on(&self.split.all(), more, less))
+    }
+
     /// The candidate of a term.
     pub fn candidate(&self, term: &Term) -> &Candidate {
         &self.estimator.plant.candidates()[term.candidate]

@@ -19,6 +19,7 @@ mod signal_chain;
 mod structure;
 mod view;
 
+pub(crate) use actuation::secants;
 pub use fitting::{Bench, Fitting, Form, Place, Shape, fits};
 pub use groups::Given;
 pub use signal_chain::{SignalChain, SignalStage};

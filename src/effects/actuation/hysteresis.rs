@@ -31,7 +31,7 @@
 //! # Source
 //! Data sheet of the MFC actuator (width about 0.2); asymmetric loops: Fu et al., Sens. Actuators A 346 (2022) 113830.
 
-use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
+use crate::effects::{Action, Applied, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
 /// See the file's head.
 pub const HYSTERESIS: Effect = Effect {
@@ -133,6 +133,21 @@ const STROKE: f64 = 1500.0;
 const PINNING_STEPS: usize = 6;
 /// Largest change of the state in a substep, as a share of its limit.
 const LARGEST_PART: f64 = 0.05;
+
+/// Slopes between the ends of the first stroke of 1500 V from rest at 0 V, and of a steady one.
+pub(crate) fn secants(hysteresis: &Applied) -> [f64; 2] {
+    let Action::Voltages(stage) = HYSTERESIS.action else { return [1.0; 2] };
+    let mut stage = stage(&hysteresis.values, 1, 0.0);
+    stage.settle(&mut [0.0]);
+    let mut to = |volts: f64| {
+        let mut out = [volts];
+        stage.pass(0.0, &mut out);
+        out[0] / STROKE
+    };
+    let first = to(STROKE);
+    let [low, high] = [to(0.0), to(STROKE)];
+    [first, high - low]
+}
 
 struct BoucWen {
     /// A.

@@ -22,6 +22,7 @@ pub use free_voltage_memory::FREE_VOLTAGE_MEMORY;
 pub use free_voltage_plays::FREE_VOLTAGE_PLAYS;
 pub use gain_drift::GAIN_DRIFT;
 pub use hysteresis::HYSTERESIS;
+pub(crate) use hysteresis::secants;
 pub use passive_margin::PASSIVE_MARGIN;
 pub use polarity_asymmetry::POLARITY_ASYMMETRY;
 pub use remanence::REMANENCE;
