@@ -5,7 +5,7 @@ use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
 use super::naming::{self, Naming};
 use super::plant::Model;
-use super::search::{LEAST_GAIN, SOUGHT, Scored, Search, Trial};
+use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, Trial};
 use super::smoothing::smoothed;
 use super::unseen::Unseen;
 use super::verdict::LEFT_SHARE;
@@ -205,6 +205,32 @@ fn constants_for_discretisation(search: &Search, best: Scored, resolution: f64) 
     other.ok().filter(|other| search.cost(other) < search.cost(&best)).unwrap_or(best)
 }
 
+/// One cause in the place of all causes and constants of a model, in its own discretisation and with the law that suits it, if that costs less: several causes
+/// and a discretisation may stand together for one that was not the best one at first.
+fn one_for_all(search: &mut Search, best: Scored) -> Result<Scored, DiagnoseError> {
+    if best.model().terms.len() < 2 {
+        return Ok(best);
+    }
+    (search.progress)("one cause in the place of all");
+    let bare = search.ranked_at_its_spread(&Model { terms: Vec::new(), ..best.model().clone() })?;
+    let screened =
+        search.screen_of(&bare, |candidate| !(candidate.is_variant || candidate.is_free_form || candidate.is_constant))?;
+    let own = PROMISING_IN_PLACE * (bare.total() - best.total());
+    let promising = screened.ranked.iter().filter(|(gain, _)| *gain >= own);
+    let one = |model: &Model| {
+        let scored = search.ranked_beyond(model, &screened).ok()?;
+        let plain = search.resolve(scored, Convergence::Rank);
+        let candidate = plain.model().terms[0].candidate;
+        let other = search.with_its_law(plain, 0);
+        // Another law in the discretisation that suits it.
+        Some(if other.model().terms[0].candidate == candidate { other } else { search.resolve(other, Convergence::Rank) })
+    };
+    let ones = search.finalists(promising, REPLACEMENTS);
+    let least = ones.iter().filter_map(one).min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)));
+    let Some(least) = least.filter(|least| search.cost(least) < search.cost(&best)) else { return Ok(best) };
+    search.settle(least)
+}
+
 /// Replaces causes by others that leave less, or that need fewer parameters and leave hardly more, and the discretisation by constants at the `resolution` that the
 /// search began with: the model, and the replacements of its causes.
 fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored, Vec<(usize, Trial)>), DiagnoseError> {
@@ -212,6 +238,7 @@ fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored
     let replacements = |search: &Search, best: &Scored| {
         if best.model().terms.is_empty() { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
     };
+    let terms = |scored: &Scored| -> Vec<usize> { scored.model().terms.iter().map(|term| term.candidate).collect() };
     let mut best = constants_for_discretisation(search, best, resolution);
     let mut replaced = replacements(search, &best);
     for _ in 0..MOST_REPLACED {
@@ -225,6 +252,11 @@ fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored
         // A cause in a constant's place lets the constant stay free beside it.
         best = search.with_significant_constants(best)?;
         best = constants_for_discretisation(search, best, resolution);
+        replaced = replacements(search, &best);
+    }
+    let before = terms(&best);
+    best = one_for_all(search, best)?;
+    if terms(&best) != before {
         replaced = replacements(search, &best);
     }
     Ok((best, replaced))
