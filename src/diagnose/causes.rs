@@ -4,7 +4,7 @@ use super::DiagnoseError;
 use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
 use super::naming::{self, Naming};
-use super::plant::Model;
+use super::plant::{Candidate, Model, Term};
 use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, Trial};
 use super::smoothing::smoothed;
 use super::unseen::Unseen;
@@ -213,10 +213,19 @@ fn one_for_all(search: &mut Search, best: Scored) -> Result<Scored, DiagnoseErro
     }
     (search.progress)("one cause in the place of all");
     let bare = search.ranked_at_its_spread(&Model { terms: Vec::new(), ..best.model().clone() })?;
-    let screened =
-        search.screen_of(&bare, |candidate| !(candidate.is_variant || candidate.is_free_form || candidate.is_constant))?;
+    let is_name = |candidate: &Candidate| !(candidate.is_variant || candidate.is_free_form || candidate.is_constant);
+    let screened = search.screen_of(&bare, is_name)?;
     let own = PROMISING_IN_PLACE * (bare.total() - best.total());
-    let promising = screened.ranked.iter().filter(|(gain, _)| *gain >= own);
+    let mut ones = search.finalists(screened.ranked.iter().filter(|(gain, _)| *gain >= own), REPLACEMENTS);
+    // Those at the places of the causes, too, which a linear estimate may miss without any cause.
+    let places: Vec<&str> = best.model().terms.iter().flat_map(|term| search.candidate(term).places.clone()).collect();
+    for (candidate, of) in search.estimator.plant.candidates().iter().enumerate() {
+        let is_of_place = of.places.iter().any(|place| places.contains(place));
+        if is_name(of) && is_of_place && ones.iter().all(|model| model.terms[0].candidate != candidate) {
+            let start = of.starts.first().map(|x| Term { candidate, x: x.clone() });
+            ones.extend(start.map(|start| Model { terms: vec![start], ..bare.model().clone() }));
+        }
+    }
     let one = |model: &Model| {
         let scored = search.ranked_beyond(model, &screened).ok()?;
         let plain = search.resolve(scored, Convergence::Rank);
@@ -225,7 +234,6 @@ fn one_for_all(search: &mut Search, best: Scored) -> Result<Scored, DiagnoseErro
         // Another law in the discretisation that suits it.
         Some(if other.model().terms[0].candidate == candidate { other } else { search.resolve(other, Convergence::Rank) })
     };
-    let ones = search.finalists(promising, REPLACEMENTS);
     let least = ones.iter().filter_map(one).min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)));
     let Some(least) = least.filter(|least| search.cost(least) < search.cost(&best)) else { return Ok(best) };
     search.settle(least)
