@@ -320,6 +320,20 @@ mod tests {
     }
 
     #[test]
+    fn one_cause_takes_the_place_of_two_that_stand_for_it() {
+        // The second cause by its other law does what both do, or nearly.
+        for (hidden, found) in [("second", vec![3]), ("first", vec![1, 0])] {
+            let plant = Waves::new(&[(hidden, 5.0), ("other", 1.0)]);
+            let mut search = search(&plant);
+            let terms = [1, 0].map(|candidate| Term { candidate, x: vec![1.0] });
+            let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
+            let one = one_for_all(&mut search, best).unwrap();
+            let candidates: Vec<usize> = one.model().terms.iter().map(|term| term.candidate).collect();
+            assert_eq!(candidates, found, "{hidden}");
+        }
+    }
+
+    #[test]
     fn constants_take_the_place_of_a_discretisation_that_stands_for_them_in_part() {
         // A resolution of 2 does what an amplitude of 1 does.
         for (hidden, resolution) in [(3.0, 1.0), (1.0, 2.0)] {

@@ -1228,6 +1228,39 @@ mod tests {
         assert!(search.above(&plain.1.scored) > 0.4 && search.above(&law.1.scored) < 0.1, "{replaced:?}");
     }
 
+    /// Two models that leave nothing but noise and a wave of that amplitude, the first one with all residuals smaller by shares of the fit and the select runs.
+    fn pair(search: &Search, [fit, select]: [f64; 2]) -> [Scored; 2] {
+        let less = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+        let mut more = less.clone();
+        for (runs, share) in [(&search.split.fit, fit), (&search.split.select, select)] {
+            runs.iter().for_each(|run| more.residuals[*run].iter_mut().for_each(|residual| *residual *= share));
+        }
+        more.fitted *= fit * fit;
+        more.select *= select * select;
+        [more, less]
+    }
+
+    #[test]
+    fn a_further_parameter_is_shown_by_select_runs_or_by_fit_runs_where_those_do_not_speak_against_it() {
+        let plant = Waves::new(&[]);
+        let search = search(&plant);
+        for (shares, shown) in [([0.9, 1.0], true), ([0.96, 1.0], false), ([0.9, 1.1], false), ([0.96, 0.9], true)] {
+            let [more, less] = pair(&search, shares);
+            assert_eq!(search.is_shown(&more, &less), shown, "{shares:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_beyond_chance_counts_in_the_place_of_another_cause_where_nothing_else_is_left() {
+        for (amplitude, is_worth) in [(0.0, true), (1.0, false)] {
+            let plant = Waves::new(&[("other", amplitude)]);
+            let search = search(&plant);
+            let [more, less] = pair(&search, [0.993; 2]);
+            assert!(search.is_significant_on(&search.split.all(), &more, &less) && !search.is_worth(&more, &less));
+            assert_eq!(search.is_worth_in_place(&more, &less), is_worth, "{amplitude}");
+        }
+    }
+
     #[test]
     fn constants_within_the_discretisation_s_error_stay_where_much_comes_back_without_them() {
         // Half of the squares: 4.5 and 0.18 times the noise.
