@@ -207,14 +207,14 @@ fn constants_for_discretisation(search: &Search, best: Scored, resolution: f64) 
 
 /// One cause in the place of all causes and constants of a model, in its own discretisation and with the law that suits it, if that costs less: several causes
 /// and a discretisation may stand together for one that was not the best one at first.
-fn one_for_all(search: &mut Search, best: Scored) -> Result<Scored, DiagnoseError> {
+fn one_for_all(search: &mut Search, best: &Scored) -> Option<Scored> {
     if best.model().terms.len() < 2 {
-        return Ok(best);
+        return None;
     }
     (search.progress)("one cause in the place of all");
-    let bare = search.ranked_at_its_spread(&Model { terms: Vec::new(), ..best.model().clone() })?;
+    let bare = search.ranked_at_its_spread(&Model { terms: Vec::new(), ..best.model().clone() }).ok()?;
     let is_name = |candidate: &Candidate| !(candidate.is_variant || candidate.is_free_form || candidate.is_constant);
-    let screened = search.screen_of(&bare, is_name)?;
+    let screened = search.screen_of(&bare, is_name).ok()?;
     let own = PROMISING_IN_PLACE * (bare.total() - best.total());
     let mut ones = search.finalists(screened.ranked.iter().filter(|(gain, _)| *gain >= own), REPLACEMENTS);
     // Those at the places of the causes, too, which a linear estimate may miss without any cause.
@@ -229,14 +229,17 @@ fn one_for_all(search: &mut Search, best: Scored) -> Result<Scored, DiagnoseErro
     let one = |model: &Model| {
         let scored = search.ranked_beyond(model, &screened).ok()?;
         let plain = search.resolve(scored, Convergence::Rank);
+        if bare.total() - plain.total() < own {
+            return None;
+        }
         let candidate = plain.model().terms[0].candidate;
         let other = search.with_its_law(plain, 0);
         // Another law in the discretisation that suits it.
         Some(if other.model().terms[0].candidate == candidate { other } else { search.resolve(other, Convergence::Rank) })
     };
     let least = ones.iter().filter_map(one).min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)));
-    let Some(least) = least.filter(|least| search.cost(least) < search.cost(&best)) else { return Ok(best) };
-    search.settle(least)
+    let least = least.filter(|least| search.cost(least) < search.cost(best))?;
+    search.settled_if(least, |_, _| true)
 }
 
 /// Replaces causes by others that leave less, or that need fewer parameters and leave hardly more, and the discretisation by constants at the `resolution` that the
@@ -246,7 +249,6 @@ fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored
     let replacements = |search: &Search, best: &Scored| {
         if best.model().terms.is_empty() { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
     };
-    let terms = |scored: &Scored| -> Vec<usize> { scored.model().terms.iter().map(|term| term.candidate).collect() };
     let mut best = constants_for_discretisation(search, best, resolution);
     let mut replaced = replacements(search, &best);
     for _ in 0..MOST_REPLACED {
@@ -262,9 +264,8 @@ fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored
         best = constants_for_discretisation(search, best, resolution);
         replaced = replacements(search, &best);
     }
-    let before = terms(&best);
-    best = one_for_all(search, best)?;
-    if terms(&best) != before {
+    if let Some(one) = one_for_all(search, &best) {
+        best = one;
         replaced = replacements(search, &best);
     }
     Ok((best, replaced))
@@ -327,7 +328,7 @@ mod tests {
             let mut search = search(&plant);
             let terms = [1, 0].map(|candidate| Term { candidate, x: vec![1.0] });
             let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
-            let one = one_for_all(&mut search, best).unwrap();
+            let one = one_for_all(&mut search, &best).unwrap_or(best);
             let candidates: Vec<usize> = one.model().terms.iter().map(|term| term.candidate).collect();
             assert_eq!(candidates, found, "{hidden}");
         }

@@ -120,7 +120,7 @@ impl Search<'_> {
     }
 
     /// A model with nuisance parameters of its own, if it can be simulated with them and `is_wanted`; otherwise they are as before.
-    fn settled_if(&mut self, model: Scored, is_wanted: impl Fn(&Self, &Scored) -> bool) -> Option<Scored> {
+    pub(super) fn settled_if(&mut self, model: Scored, is_wanted: impl Fn(&Self, &Scored) -> bool) -> Option<Scored> {
         let before = self.estimator.state();
         let settled = self.settle(model).ok().filter(|settled| is_wanted(self, settled));
         if settled.is_none() {
