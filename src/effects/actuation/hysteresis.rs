@@ -137,16 +137,18 @@ const LARGEST_PART: f64 = 0.05;
 /// Slopes between the ends of the first stroke of 1500 V from rest at 0 V, and of a steady one.
 pub(crate) fn secants(hysteresis: &Applied) -> [f64; 2] {
     let Action::Voltages(stage) = HYSTERESIS.action else { return [1.0; 2] };
-    let mut stage = stage(&hysteresis.values, 1, 0.0);
+    secants_of(&mut *stage(&hysteresis.values, 1, 0.0))
+}
+
+/// The same of a stage; its second loop is taken for steady.
+fn secants_of(stage: &mut dyn SignalStage) -> [f64; 2] {
     stage.settle(&mut [0.0]);
-    let mut to = |volts: f64| {
+    let [first, _, high, low] = [STROKE, 0.0, STROKE, 0.0].map(|volts| {
         let mut out = [volts];
         stage.pass(0.0, &mut out);
-        out[0] / STROKE
-    };
-    let first = to(STROKE);
-    let [low, high] = [to(0.0), to(STROKE)];
-    [first, high - low]
+        out[0]
+    });
+    [first / STROKE, (high - low) / STROKE]
 }
 
 struct BoucWen {
@@ -172,7 +174,7 @@ impl BoucWen {
         let mut gain = if p[9] < 0.5 { p[6] } else { 1.0 };
         // The secant changes little with the gain, so this converges in some steps.
         for _ in 0..if p[9] < 0.5 { 0 } else { PINNING_STEPS } {
-            gain /= Self::with_gain(p, gain, 1).secant();
+            gain /= secants_of(&mut Self::with_gain(p, gain, 1))[1];
         }
         Self::with_gain(p, gain, actuators)
     }
@@ -189,19 +191,6 @@ impl BoucWen {
             volts: vec![0.0; actuators],
             state: vec![0.0; actuators],
         }
-    }
-
-    /// Slope between the ends of a steady loop from 0 to a full stroke.
-    fn secant(mut self) -> f64 {
-        let mut ends = [0.0; 2];
-        for _ in 0..2 {
-            for (end, volts) in ends.iter_mut().zip([STROKE, 0.0]) {
-                let mut out = [volts];
-                self.pass(0.0, &mut out);
-                *end = out[0];
-            }
-        }
-        (ends[0] - ends[1]) / STROKE
     }
 
     /// dh/dV at the state `h` for a voltage that changes in the direction `sign`.
