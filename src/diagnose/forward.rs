@@ -37,10 +37,13 @@ impl Search<'_> {
                     .or_else(|| self.worth_once_settled(top?, &best))
                     .or_else(|| self.both(&screened, &best)),
             };
+            let settled = worthy.and_then(|worthy| {
+                (self.progress)(&self.adopting(&worthy, &best));
+                self.settled(worthy)
+            });
+            let settled = settled.map(|settled| self.or_a_name_once_settled(settled, &trials));
             first.get_or_insert(trials);
-            let Some(worthy) = worthy else { break };
-            (self.progress)(&self.adopting(&worthy, &best));
-            let Some(settled) = self.settled(worthy) else { break };
+            let Some(settled) = settled else { break };
             best = settled;
             if self.is_given_up(&best) {
                 break;
@@ -72,6 +75,29 @@ impl Search<'_> {
         });
         let best = with_laws.min_by(|a, b| self.judged(a).total_cmp(&self.judged(b)));
         best.filter(|best| !self.is_closer(&free, best)).unwrap_or(free)
+    }
+
+    /// A model, or the best name of its last free form's place with all that suits the name, if the free form leaves much and the name then costs less: times of jumps
+    /// that suit the model without a limit of the rate let a linear filter look better.
+    fn or_a_name_once_settled(&mut self, free: Scored, trials: &[Trial]) -> Scored {
+        let names = trials.iter().map(|other| &other.scored);
+        let Some(name) = names.into_iter().find(|name| self.ends_free(free.model()) && self.is_name_of(&free, name)) else {
+            return free;
+        };
+        if self.above(&free) <= VISIBLE {
+            return free;
+        }
+        let before = self.estimator.state();
+        match self.settled(name.clone()).filter(|name| self.cost(name) < self.cost(&free)) {
+            Some(name) => {
+                (self.progress)(&self.adopting(&name, &free));
+                name
+            }
+            None => {
+                self.estimator.restore(before);
+                free
+            }
+        }
     }
 
     /// True if the last term of a model is a named cause of the place of the free form that `free` ends with.
