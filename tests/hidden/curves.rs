@@ -29,6 +29,12 @@ pub fn rational_growth(share: f64, _: f64) -> Operator {
     curve(move |v| v * (1.0 + share * v * v / (v * v + 640_000.0)))
 }
 
+/// The charge constant is that of small signals up to a threshold of 0.7 kV/mm, 350 V, and grows with the field beyond it: domain walls move irreversibly
+/// from there on (Hall, J. Mater. Sci. 36 (2001) 4575). The size is the growth per kV.
+pub fn threshold_growth(slope: f64, _: f64) -> Operator {
+    curve(move |v| v * (1.0 + 1e-3 * slope * (v.abs() - 350.0).max(0.0)))
+}
+
 /// The gain of positive voltages sets in over 60 V instead of at once.
 pub fn smooth_polarity(excess: f64, _: f64) -> Operator {
     curve(move |v| v * (1.0 + 0.5 * excess * (1.0 + (v / 60.0).tanh())))
@@ -37,6 +43,12 @@ pub fn smooth_polarity(excess: f64, _: f64) -> Operator {
 /// The gain of positive voltages grows with them, as on the way to depoling (Damjanovic, Rep. Prog. Phys. 61 (1998) 1267).
 pub fn growing_polarity(excess: f64, _: f64) -> Operator {
     curve(move |v| if v > 0.0 { v * (1.0 + excess * v / 300.0) } else { v })
+}
+
+/// What positive voltages do more levels off over 300 V, as the domains that they turn run out. The size is the excess of the gain at small ones.
+pub fn levelling_polarity(excess: f64, _: f64) -> Operator {
+    const RANGE: f64 = 300.0;
+    curve(move |v| if v > 0.0 { v - excess * RANGE * (-v / RANGE).exp_m1() } else { v })
 }
 
 /// Positive voltages act only beyond a dead zone, rounded over 8 V.
@@ -64,5 +76,25 @@ pub fn parabolic_limit(limit: f64, _: f64) -> Operator {
         } else {
             -limit
         }
+    })
+}
+
+/// A varistor across the output, behind a resistor: its current grows with the power 15 of the voltage `x`, so `v = x + limit (x / limit)^15`
+/// (Levinson and Philipp, J. Appl. Phys. 46 (1975) 1332). At the size as much voltage drops in the resistor as is left.
+pub fn varistor(limit: f64, _: f64) -> Operator {
+    const POWER: i32 = 15;
+    curve(move |v| {
+        let aim = v.abs() / limit;
+        // Newton's method from above, where the curve bends upwards.
+        let mut left = aim.min(aim.powf(1.0 / f64::from(POWER)));
+        for _ in 0..40 {
+            let excess = left + left.powi(POWER) - aim;
+            let slope = 1.0 + f64::from(POWER) * left.powi(POWER - 1);
+            left -= excess / slope;
+            if excess < 1e-13 {
+                break;
+            }
+        }
+        limit * left.copysign(v)
     })
 }

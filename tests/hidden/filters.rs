@@ -59,6 +59,17 @@ pub fn cascade(time: f64, first: f64) -> Operator {
     })
 }
 
+/// A resistor before a capacitance that grows by its small-signal value per kV, with the irreversible part of the permittivity (Hall, J. Mater. Sci. 36
+/// (2001) 4575); the size is the time constant of small signals, s.
+pub fn growing_capacitance(time: f64, first: f64) -> Operator {
+    let (mut now, mut before) = (first, first);
+    Box::new(move |v, dt| {
+        in_parts(before, v, dt, |middle, part| now = follow(now, middle, middle, part, time * (1.0 + 1e-3 * now.abs())));
+        before = v;
+        now
+    })
+}
+
 /// The current of a differential pair, a hyperbolic tangent of its input (Gray and Meyer), charges the load; the size is the limit in V/s.
 pub fn tanh_rate(limit: f64, first: f64) -> Operator {
     const TIME: f64 = 1e-4;
@@ -85,6 +96,22 @@ pub fn drooping_rate(limit: f64, first: f64) -> Operator {
     Box::new(move |v, dt| {
         let most = limit * (1.0 - now.abs() / 2200.0).max(0.1) * dt;
         now += (v - now).clamp(-most, most);
+        now
+    })
+}
+
+/// Twice the lasting current for a short time: the limit falls from the peak's to the lasting one's as the mean over 10 ms of the current grows (peak and average
+/// current in data sheets of piezo amplifiers). The size is the lasting limit in V/s.
+pub fn peak_current(limit: f64, first: f64) -> Operator {
+    let (mut now, mut load) = (first, 0.0);
+    Box::new(move |v, dt| {
+        if dt > 0.0 {
+            let most = limit * (2.0 - load) * dt;
+            let change = (v - now).clamp(-most, most);
+            now += change;
+            let used = change.abs() / (limit * dt);
+            load = follow(load, used, used, dt, 0.01);
+        }
         now
     })
 }

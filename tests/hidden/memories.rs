@@ -48,6 +48,22 @@ pub fn threshold_creep(share: f64, first: f64) -> Operator {
     })
 }
 
+/// Creep by thermal activation: its rate is a hyperbolic sine of what is left of it, `(300 V / 6 s) sinh((v - q) / 300 V)` (Eyring, J. Chem. Phys. 4
+/// (1936) 283), so that it is fast after large steps and slows down as a logarithm.
+pub fn activated_creep(share: f64, first: f64) -> Operator {
+    const RANGE: f64 = 300.0;
+    const TIME: f64 = 6.0;
+    let mut state = first;
+    Box::new(move |v, dt| {
+        // Exact for a constant voltage.
+        let left = (0.5 * (v - state) / RANGE).tanh() * (-dt / TIME).exp();
+        if dt > 0.0 {
+            state = v - 2.0 * RANGE * left.atanh();
+        }
+        v + share * state
+    })
+}
+
 /// Makes the answer to a stroke from 0 to -1500 V as large as the stroke.
 fn with_full_stroke(make: impl Fn(f64) -> Operator, first: f64) -> Operator {
     let mut fresh = make(0.0);
@@ -140,4 +156,35 @@ pub fn rayleigh(share: f64, first: f64) -> Operator {
         now = [v, branch(&turns, v)];
         now[1]
     })
+}
+
+/// Langevin's function.
+fn langevin(x: f64) -> f64 {
+    if x.abs() < 1e-3 { x / 3.0 } else { 1.0 / x.tanh() - 1.0 / x }
+}
+
+/// Jiles and Atherton's model for walls of ferroelectric domains: an anhysteretic curve of Langevin, which the irreversible polarisation follows over the
+/// pinning voltage and only towards it, and bowing walls (Smith and Hom, J. Intell. Mater. Syst. Struct. 10 (1999) 195; without the field of the
+/// neighbours). The size is the share of domains in the strain.
+pub fn jiles_atherton(share: f64, first: f64) -> Operator {
+    const SHAPE: f64 = 700.0;
+    const PINNING: f64 = 250.0;
+    const BOWING: f64 = 0.2;
+    let make = move |first: f64| -> Operator {
+        let (mut irreversible, mut before) = (langevin(first / SHAPE), first);
+        Box::new(move |v, _| {
+            let parts = ((v - before).abs() / 5.0).ceil().max(1.0);
+            let part = (v - before) / parts;
+            for k in 0..parts as usize {
+                let lag = langevin((before + (k as f64 + 0.5) * part) / SHAPE) - irreversible;
+                if lag * part > 0.0 {
+                    irreversible -= lag * (-part.abs() / PINNING).exp_m1();
+                }
+            }
+            before = v;
+            let domains = BOWING * langevin(v / SHAPE) + (1.0 - BOWING) * irreversible;
+            (1.0 - share) * v + share * 3.0 * SHAPE * domains
+        })
+    };
+    with_full_stroke(make, first)
 }

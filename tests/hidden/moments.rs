@@ -7,10 +7,16 @@ pub type Memory = [f64; MEMORY];
 /// Curvatures over which a plateau is reached, and where the softer branch begins, 1/cm.
 const PLATEAU_PER_CM: f64 = 0.03;
 const CORNER_PER_CM: f64 = 0.012;
+/// Curvature at which half of the loss of stiffness is reached, 1/cm, and the power with which it comes (Kraus).
+const KRAUS_PER_CM: f64 = 0.015;
+const KRAUS_POWER: f64 = 1.2;
 /// Angle over which friction builds up before it slides, rad (Dahl), and the largest such angle of the Jenkins elements.
 const PRESLIDING: f64 = 0.002;
 const JENKINS: usize = 6;
 const LARGEST_SLIP: f64 = 0.006;
+/// Deflection of the bristles from which they slide, rad, and the time of their damping, s (LuGre).
+const BRISTLE: f64 = 0.001;
+const BRISTLE_TIME: f64 = 0.001;
 /// Speeds over which friction turns, and over which its static excess vanishes, rad/s.
 const TURN_SPEED: f64 = 0.06;
 const STRIBECK_SPEED: f64 = 0.2;
@@ -18,10 +24,15 @@ const STATIC_EXCESS: f64 = 0.4;
 /// Speed over which the loss in proportion to the amplitude turns, rad/s.
 const REID_SPEED: f64 = 0.05;
 const FRACTION: f64 = 0.2;
+/// Time about which the relaxation times of a broad peak lie, s: 8 Hz; its order.
+const BROAD_TIME: f64 = 0.02;
+const BROAD_ORDER: f64 = 0.5;
 /// Time of the one Maxwell element, s: 10 Hz.
 const ZENER_TIME: f64 = 0.0159;
 /// Softness of the play of a clamp at its middle.
 const PLAY_SHARE: f64 = 0.9;
+/// By how much a clamp is stiffer and softer than its mean towards either side.
+const SIDE_SHARE: f64 = 0.5;
 
 /// A law that adds to the linear moment of a joint.
 #[derive(Clone, Copy)]
@@ -32,16 +43,23 @@ pub enum Moment {
     SofteningToPlateau(f64),
     /// Stiffness is less by a share beyond a corner: a bilinear spring.
     SofteningAtCorner(f64),
+    /// Stiffness falls between two plateaus as that of a filled polymer, here the bond: Kraus, J. Appl. Polym. Sci. Appl. Polym. Symp. 39 (1984) 75; the
+    /// share lost.
+    SofteningByKraus(f64),
     /// Friction with a static excess: Stribeck's curve, regularised by a root (Armstrong-Helouvry, 1991). Moments in dyn cm from here.
     Stribeck(f64),
     /// Dahl's friction with presliding.
     Dahl(f64),
     /// Jenkins elements of equal stiffness in parallel: Iwan, J. Appl. Mech. 33 (1966) 893.
     Iwan(f64),
+    /// Bristles with Stribeck's curve: Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419.
+    LuGre(f64),
     /// A fractional derivative of order 0.2, by a dense ladder (Bagley and Torvik, J. Rheol. 27 (1983) 201); share of the stiffness at 1 rad/s.
     Fractional(f64),
     /// The standard linear solid: one Maxwell element; its share of the stiffness.
     Zener(f64),
+    /// A broad peak of the loss, the fractional standard solid with Cole and Cole's relaxation times: Pritz, J. Sound Vib. 195 (1996) 103; share of the stiffness.
+    BroadPeak(f64),
     /// A loss in proportion to the angle and against the motion: Reid, J. R. Aeronaut. Soc. 60 (1956) 283; share of the stiffness.
     Reid(f64),
     /// The clamp has a damper; its time in s.
@@ -50,6 +68,8 @@ pub enum Moment {
     ClampHardening(f64),
     /// The clamp has a smoothed play; its half width in rad.
     ClampPlay(f64),
+    /// The jaws of the clamp give unlike to either side, a bilinear spring: Shaw and Holmes, J. Sound Vib. 90 (1983) 129; the angle in rad over which it turns.
+    ClampOneSided(f64),
 }
 
 /// What a joint does: angles in rad, speed in rad/s, stiffness in dyn cm/rad, and its memory before a step with the step's length.
@@ -81,18 +101,39 @@ fn rung(index: usize) -> [f64; 2] {
     [time, 0.25 * 10f64.ln() * (pi * FRACTION).sin() / pi * time.powf(-FRACTION)]
 }
 
+/// Time and weight of a branch of a broad peak: Cole and Cole's density over ln T.
+fn broad_rung(index: usize) -> [f64; 2] {
+    let [time, _] = rung(index);
+    let (phase, ratio) = (std::f64::consts::PI * BROAD_ORDER, (time / BROAD_TIME).ln());
+    let density = phase.sin() / (std::f64::consts::TAU * ((BROAD_ORDER * ratio).cosh() + phase.cos()));
+    [time, 0.25 * 10f64.ln() * density]
+}
+
+/// Deflection at which bristles slide at a speed.
+fn bristle_limit(speed: f64) -> f64 {
+    BRISTLE * (1.0 + STATIC_EXCESS * (-(speed / STRIBECK_SPEED).powi(2)).exp())
+}
+
 fn jenkins_limit(index: usize) -> f64 {
     LARGEST_SLIP * (index + 1) as f64 / JENKINS as f64
 }
 
 impl Moment {
     pub fn remembers(&self) -> bool {
-        matches!(self, Moment::Dahl(_) | Moment::Iwan(_) | Moment::Fractional(_) | Moment::Zener(_))
+        matches!(
+            self,
+            Moment::Dahl(_)
+                | Moment::Iwan(_)
+                | Moment::LuGre(_)
+                | Moment::Fractional(_)
+                | Moment::Zener(_)
+                | Moment::BroadPeak(_)
+        )
     }
 
     /// True if it turns so sharply that it needs short steps.
     pub fn is_sharp(&self) -> bool {
-        matches!(self, Moment::Stribeck(_) | Moment::Dahl(_) | Moment::Iwan(_) | Moment::Reid(_))
+        matches!(self, Moment::Stribeck(_) | Moment::Dahl(_) | Moment::Iwan(_) | Moment::LuGre(_) | Moment::Reid(_))
     }
 
     /// The memory after a step, by the implicit Euler method.
@@ -100,13 +141,14 @@ impl Moment {
         let mut after = *before;
         match self {
             Moment::Dahl(_) => after[0] = (before[0] + step * speed) / (1.0 + step * speed.abs() / PRESLIDING),
+            Moment::LuGre(_) => after[0] = (before[0] + step * speed) / (1.0 + step * speed.abs() / bristle_limit(speed)),
             Moment::Zener(_) => after[0] = (before[0] + step * speed) / (1.0 + step / ZENER_TIME),
             Moment::Iwan(_) => {
                 for (i, place) in after.iter_mut().enumerate().take(JENKINS) {
                     *place = (*place + step * speed).clamp(-jenkins_limit(i), jenkins_limit(i));
                 }
             }
-            Moment::Fractional(_) => {
+            Moment::Fractional(_) | Moment::BroadPeak(_) => {
                 for (i, place) in after.iter_mut().enumerate() {
                     *place = (*place + step * speed) / (1.0 + step / rung(i)[0]);
                 }
@@ -119,7 +161,10 @@ impl Moment {
     /// What it adds to the moment of a joint.
     pub fn of(&self, motion: &Motion) -> Addition {
         match *self {
-            Moment::SofteningByStrain(_) | Moment::SofteningToPlateau(_) | Moment::SofteningAtCorner(_) => self.softening(motion),
+            Moment::SofteningByStrain(_)
+            | Moment::SofteningToPlateau(_)
+            | Moment::SofteningAtCorner(_)
+            | Moment::SofteningByKraus(_) => self.softening(motion),
             Moment::Stribeck(moment) => {
                 let speed = motion.speed;
                 let excess = 1.0 + STATIC_EXCESS * (-(speed / STRIBECK_SPEED).powi(2)).exp();
@@ -139,6 +184,10 @@ impl Moment {
                 let (tanh, part) = ((motion.bend / angle).tanh(), PLAY_SHARE * motion.stiffness);
                 Addition { moment: part * angle * tanh, stiffness: -part * (1.0 - tanh * tanh), damping: 0.0 }
             }
+            Moment::ClampOneSided(angle) => {
+                let (root, part) = (motion.bend.hypot(angle), SIDE_SHARE * motion.stiffness);
+                Addition { moment: -part * (root - angle), stiffness: part * motion.bend / root, damping: 0.0 }
+            }
             _ => motion.before.map_or(Addition::default(), |(before, step)| self.remembered(motion, before, step)),
         }
     }
@@ -148,6 +197,10 @@ impl Moment {
         let lost = match *self {
             Moment::SofteningByStrain(factor_cm) => (factor_cm * curvature).min(0.45),
             Moment::SofteningToPlateau(share) => share * -(-curvature / PLATEAU_PER_CM).exp_m1(),
+            Moment::SofteningByKraus(share) => {
+                let part = (curvature / KRAUS_PER_CM).powf(KRAUS_POWER);
+                share * part / (1.0 + part)
+            }
             Moment::SofteningAtCorner(share) => share * (1.0 - CORNER_PER_CM / curvature.max(CORNER_PER_CM)),
             _ => 0.0,
         };
@@ -162,6 +215,13 @@ impl Moment {
                 let left = (1.0 - motion.speed.signum() * before[0] / PRESLIDING).max(0.0);
                 against_speed(moment * after[0] / PRESLIDING, moment / PRESLIDING * step * left / (slid * slid))
             }
+            Moment::LuGre(moment) => {
+                let limit = bristle_limit(motion.speed);
+                let slid = 1.0 + step * motion.speed.abs() / limit;
+                let left = (1.0 - motion.speed.signum() * before[0] / limit).max(0.0);
+                let bristles = after[0] + BRISTLE_TIME * (after[0] - before[0]) / step;
+                against_speed(moment / BRISTLE * bristles, moment / BRISTLE * (step + BRISTLE_TIME) * left / (slid * slid))
+            }
             Moment::Iwan(moment) => {
                 let spring = moment / (0..JENKINS).map(jenkins_limit).sum::<f64>();
                 let sticking = (0..JENKINS).filter(|i| after[*i].abs() < jenkins_limit(*i)).count();
@@ -171,11 +231,12 @@ impl Moment {
                 let part = motion.stiffness * share;
                 against_speed(part * after[0], part * step / (1.0 + step / ZENER_TIME))
             }
-            Moment::Fractional(share) => {
+            Moment::Fractional(share) | Moment::BroadPeak(share) => {
+                let of = if matches!(self, Moment::BroadPeak(_)) { broad_rung } else { rung };
                 let part = motion.stiffness * share;
                 let (mut moment, mut damping) = (0.0, 0.0);
                 for (i, place) in after.iter().enumerate() {
-                    let [time, weight] = rung(i);
+                    let [time, weight] = of(i);
                     moment += part * weight * place;
                     damping += part * weight * step / (1.0 + step / time);
                 }
@@ -188,6 +249,8 @@ impl Moment {
 
 /// Speed in cm/s at which drag with another power is as large as the square law.
 const EQUAL_SPEED: f64 = 100.0;
+/// Speed in cm/s of the Reynolds number 80, about the square of Abraham's constant 9.06.
+const LAYER_SPEED: f64 = 6.0;
 /// Arc length in cm beyond which a fence drags.
 const FENCE_CM: f64 = 8.0;
 
@@ -201,6 +264,8 @@ pub enum Air {
     Fence(f64),
     /// Linear and quadratic drag, which are equal at 100 cm/s.
     Mixed(f64),
+    /// A coefficient that falls with the Reynolds number as `(1 + const / sqrt(Re))^2`: Abraham, Phys. Fluids 13 (1970) 2194.
+    Reynolds(f64),
 }
 
 impl Air {
@@ -211,6 +276,7 @@ impl Air {
             Air::Fence(factor) if arc_cm >= FENCE_CM => factor * speed * speed.abs(),
             Air::Fence(_) => 0.0,
             Air::Mixed(factor) => factor * speed * (speed.abs() + EQUAL_SPEED),
+            Air::Reynolds(factor) => factor * speed * (speed.abs().sqrt() + LAYER_SPEED.sqrt()).powi(2),
         }
     }
 }
