@@ -289,8 +289,8 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::plant::{Model, Term};
-    use crate::diagnose::waves::{Waves, search};
+    use crate::diagnose::plant::{Candidate, Model, Term};
+    use crate::diagnose::waves::{Waves, candidate, search};
 
     #[test]
     fn of_free_forms_that_are_closer_than_a_name_the_least_costly_on_all_runs_is_adopted() {
@@ -361,6 +361,20 @@ mod tests {
             assert_eq!(settled.model().terms[0].candidate, 3);
             assert!(law.above(&settled) < VISIBLE, "{lateness}: {}", law.above(&settled));
         }
+    }
+
+    #[test]
+    fn a_name_with_nuisance_parameters_of_its_own_is_adopted_where_a_free_form_leaves_much() {
+        // With the shares of the model without causes the free form takes most of it.
+        let mut plant = Waves::new(&[("other", 3.0), ("late", 12.0)]);
+        plant.lateness = 4.0;
+        plant.candidates = vec![candidate("other"), Candidate { is_free_form: true, ..candidate("late") }];
+        let mut search = search(&plant);
+        let plain = search.calibrated(1.0).unwrap();
+        let (best, first) = search.forward(plain).unwrap();
+        assert_eq!(first[0].candidate, 1);
+        assert_eq!(best.model().terms.iter().map(|term| term.candidate).collect::<Vec<_>>(), [0]);
+        assert!(search.estimator.shares().amax() < 0.1, "{}", search.estimator.shares());
     }
 
     #[test]
