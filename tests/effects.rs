@@ -509,7 +509,7 @@ fn free_forms_hold_the_named_laws_of_their_places() {
     let line: Vec<_> = (0..8).map(|k| (below[k], -100.0 * (k + 1) as f64 / 8.0)).chain(ends).collect();
     let soft = |c: f64| [1, 2, 3, 4].map(|k| (COMPLIANCES[k - 1], c));
     let [s1, s2, s3, s4] = soft(0.7);
-    let cases: [(Effects, Effects); 15] = [
+    let cases: [(Effects, Effects); 16] = [
         (
             &[(
                 "free-stiffness-along",
@@ -546,6 +546,10 @@ fn free_forms_hold_the_named_laws_of_their_places() {
         ),
         (&[("free-drag", &[("cubic", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 3.0)])]),
         (&[("free-drag", &[("linear", 40.0)])], &[("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.0)])]),
+        (
+            &[("free-drag", &[("linear", 20.0), ("quadratic", 40.0)])],
+            &[("air-drag", &[("drag_coefficient", 40.0), ("linear_m_per_s", 0.5)])],
+        ),
         (&[("free-joint-memory", &loss)], &[("structural-damping", &[("loss_factor", 0.05 * 0.68), ("exponent", -0.5)])]),
         (&[("free-joint-friction", &even)], &[("dry-friction", &[("moment_mn_m", 0.05)])]),
         (&[("free-joint-friction", &rising)], &[("structural-damping", &[("bending_loss_factor", 0.02)])]),

@@ -55,7 +55,7 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 30] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 31] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
@@ -70,6 +70,7 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 30] = [
     ("free-drag", &[("linear", 20.0), ("cubic", 10.0)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("damping_s", 5e-3)]),
     ("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.5)]),
+    ("air-drag", &[("drag_coefficient", 40.0), ("linear_m_per_s", 0.5)]),
     ("stiffness-softening", &[("softening_mm2", 2000.0), ("exponent", 1.0)]),
     ("structural-damping", &[("loss_factor", 0.05), ("exponent", 0.3)]),
     ("dry-friction", &[("moment_mn_m", 0.3), ("presliding_per_m", 0.5)]),

@@ -36,6 +36,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         },
         "creep" => match given("rungs_per_decade") {
             Some(0.0) => "one time constant".into(),
+            Some(_) if fitted.nth(1) == Some("fastest_s") => "logarithmic from a time on".into(),
             Some(1.0) if given("fastest_s").is_some() => "one time constant in a decade, from 10 ms on".into(),
             Some(1.0) => "one time constant in a decade".into(),
             Some(count) => format!("{count} time constants in a decade"),
@@ -51,6 +52,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         "field-dependent-gain" => fitted.find(|name| *name == "exponent").map_or("", |_| "as a power").into(),
         "driver-lag" => match fitted.nth(1) {
             Some("rising") => "with another time constant of rising voltages".into(),
+            Some("growth_per_kv") => "of a capacitance that grows".into(),
             Some(_) => "of second order".into(),
             None => String::new(),
         },
@@ -64,7 +66,12 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
             (_, Some(_)) => "with an exponent".into(),
             _ => String::new(),
         },
-        "air-drag" | "stiffness-softening" | "polarity-asymmetry" => fitted.nth(1).map_or("", |_| "with an exponent").into(),
+        "air-drag" => match fitted.nth(1) {
+            Some("linear_m_per_s") => "with a part in proportion to the speed".into(),
+            Some(_) => "with an exponent".into(),
+            None => String::new(),
+        },
+        "stiffness-softening" | "polarity-asymmetry" => fitted.nth(1).map_or("", |_| "with an exponent").into(),
         "remanence" => fitted.nth(2).map_or("", |_| "that saturates").into(),
         "dry-friction" => fitted.nth(1).map_or("", |_| "with presliding").into(),
         "cable-drag" => {
@@ -136,6 +143,8 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("slew-limit", "linear_s") => "time constant of small changes".into(),
         ("slew-limit", _) => "largest rate".into(),
         ("driver-lag", "inertia") => "inertia of the driver".into(),
+        ("driver-lag", "growth_per_kv") => "growth of the capacitance with the voltage".into(),
+        ("air-drag", "linear_m_per_s") => "speed of equal linear and quadratic drag".into(),
         ("driver-lag", "rising") => "time constant of rising voltages over that of falling ones".into(),
         ("field-dependent-gain", "reference_v") => "voltage of nominal gain".into(),
         ("ground-friction", _) => "factor on the friction".into(),

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Spread};
 use super::candidates::candidates;
-use super::conventions::is_gain_a_convention;
+use super::conventions::{is_curve_a_convention, is_gain_a_convention};
 use super::dataset::{Bench, Dataset, MeasuredRun, Response, Start};
 use super::kept::Kept;
 use super::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal, Term};
@@ -410,8 +410,11 @@ impl Plant for RobotPlant {
 
     fn is_convention(&self, terms: &[Term], index: usize, left: f64) -> bool {
         let effects: Result<Vec<Applied>, _> = terms.iter().map(|term| self.applied(term)).collect();
-        self.candidates[terms[index].candidate].id == "actuation-gain"
-            && effects.is_ok_and(|effects| is_gain_a_convention(&effects, left))
+        effects.is_ok_and(|effects| match self.candidates[terms[index].candidate].id {
+            "actuation-gain" => is_gain_a_convention(&effects, left),
+            "field-dependent-gain" => is_curve_a_convention(&effects, left),
+            _ => false,
+        })
     }
 
     fn curve(&self, term: &Term) -> Option<FreeCurve> {

@@ -7,7 +7,7 @@
 //! The elements are a Kelvin-Voigt chain. T_max is three times the run's length unless it is given, so runs of different lengths have the same
 //! elements only where it is; a run that continues from a saved state keeps the elements of that state.
 //!
-//! With p = 0 the response to a step grows by the share c per decade of time, with another p by a power law of time. r is the number of elements per
+//! With p = 0 the response to a step grows by the share c per decade of time beyond T_0, with another p by a power law of time. r is the number of elements per
 //! decade; r = 0 is a single element of the weight c.
 //!
 //! # Parameters
@@ -33,7 +33,7 @@ pub const CREEP: Effect = Effect {
         Parameter {
             name: "per_decade",
             unit: "1/decade",
-            bounds: [0.0, 0.3],
+            bounds: [0.0, 1.0],
             off: Some(0.0),
             default: None,
             about: "growth c of the step response in the decade about 1 s",
@@ -88,6 +88,11 @@ pub const CREEP: Effect = Effect {
                 fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
                 starts: &[&[0.02, 0.3], &[0.02, 3.0]],
                 given: &[("rungs_per_decade", 0.0)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
+                starts: &[&[0.02, 0.3], &[0.02, 3.0]],
+                given: &[("rungs_per_decade", 2.0)],
             },
         ],
     },

@@ -1,16 +1,17 @@
 //! The source's resistance charges the actuator's capacitance.
 //!
 //! ```text
-//! b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C;  r·T where V_c > V_a
+//! b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C·(1 + g·|V_a|);  r·T where V_c > V_a
 //! ```
 //!
 //! # Parameters
-//! * `time_constant_s` (s): time constant T
+//! * `time_constant_s` (s): time constant T of small voltages
 //! * `inertia` (–): b: 0 is a resistance and a capacitance, ¼ two equal ones in a row; above ¼ the amplifier overshoots
 //! * `rising` (–): r: time constant of rising voltages over that of falling ones, of a source and a sink of different resistance
+//! * `growth_per_kv` (1/kV): g: growth of the capacitance with the voltage
 //!
 //! # Source
-//! Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems.
+//! Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems. Growth: Hall, J. Mater. Sci. 36 (2001) 4575.
 
 use super::follower::{Follower, Law};
 use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
@@ -20,8 +21,8 @@ pub const DRIVER_LAG: Effect = Effect {
     id: "driver-lag",
     kind: Kind::Driver,
     cause: "The source's resistance charges the actuator's capacitance.",
-    equation: "b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C;  r·T where V_c > V_a",
-    source: "Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems.",
+    equation: "b·T²·d²V_a/dt² + T·dV_a/dt + V_a = V_c,  T = R·C·(1 + g·|V_a|);  r·T where V_c > V_a",
+    source: "Capacitance per area: data sheet of the MFC actuator; derived. Second order: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems. Growth: Hall, J. Mater. Sci. 36 (2001) 4575.",
     parameters: &[
         Parameter {
             name: "time_constant_s",
@@ -29,7 +30,7 @@ pub const DRIVER_LAG: Effect = Effect {
             bounds: [0.0, 0.2],
             off: Some(0.0),
             default: None,
-            about: "time constant T",
+            about: "time constant T of small voltages",
         },
         Parameter {
             name: "inertia",
@@ -47,6 +48,14 @@ pub const DRIVER_LAG: Effect = Effect {
             default: Some(1.0),
             about: "r: time constant of rising voltages over that of falling ones, of a source and a sink of different resistance",
         },
+        Parameter {
+            name: "growth_per_kv",
+            unit: "1/kV",
+            bounds: [0.0, 10.0],
+            off: None,
+            default: Some(0.0),
+            about: "g: growth of the capacitance with the voltage",
+        },
     ],
     places: &[Place::Drive],
     fitting: Fitting::Candidate {
@@ -58,50 +67,72 @@ pub const DRIVER_LAG: Effect = Effect {
                 starts: &[&[0.001, 2.0], &[0.001, 0.5], &[0.005, 2.0], &[0.005, 0.5]],
                 given: &[],
             },
+            Form {
+                fitted: &[("time_constant_s", 0.002), ("growth_per_kv", 0.5)],
+                starts: &[&[0.001, 0.5], &[0.005, 0.5]],
+                given: &[],
+            },
         ],
         forms: &[Form { fitted: &[("time_constant_s", 0.002)], starts: &[&[0.001], &[0.005]], given: &[] }],
     },
     shape: None,
-    action: Action::Voltages(|p, n, _| match *p {
-        [time, inertia, rising] if inertia > 0.0 => Box::new(SecondOrder { time, inertia, rising, state: vec![[0.0; 2]; n] }),
-        _ => Box::new(Follower::new(Lag { time: p[0], rising: p[2] }, n)),
+    action: Action::Voltages(|p, n, _| {
+        let lag = Lag { time: p[0], rising: p[2], growth: 1e-3 * p[3] };
+        match p[1] {
+            inertia if inertia > 0.0 => Box::new(SecondOrder { lag, inertia, state: vec![[0.0; 2]; n] }),
+            _ => Box::new(Follower::new(lag, n)),
+        }
     }),
 };
 
-/// The state is the voltage at the end of the last step; exact for voltages that are constant over a step.
+/// The state is the voltage at the end of the last step; exact for voltages that are constant over a step, if T does not grow, otherwise of second order in it.
 struct Lag {
-    /// T (s).
+    /// T of small voltages (s).
     time: f64,
     /// r.
     rising: f64,
+    /// g (1/V).
+    growth: f64,
+}
+
+impl Lag {
+    /// T over that of falling small voltages, at a voltage that is `away` from the commanded one.
+    fn ratio(&self, voltage: f64, away: f64) -> f64 {
+        (if away < 0.0 { self.rising } else { 1.0 }) * (1.0 + self.growth * voltage.abs())
+    }
 }
 
 impl Law for Lag {
     fn follow(&self, dt: f64, state: &mut [f64], volts: &mut [f64]) {
         // 1 − exp(−dt/T), and its mean over the step.
-        let relaxed = |time: f64| {
+        let relaxed = |ratio: f64| {
+            let time = ratio * self.time;
             let gone = -(-dt / time).exp_m1();
             [gone, gone * time / dt]
         };
-        let (rising, falling) = (relaxed(self.rising * self.time), relaxed(self.time));
+        let (rising, falling) = (relaxed(self.rising), relaxed(1.0));
         for (state, volts) in state.iter_mut().zip(volts) {
             let away = *state - *volts;
-            let [gone, mean] = if away < 0.0 { rising } else { falling };
+            let mut part = if away < 0.0 { rising } else { falling };
+            if self.growth != 0.0 {
+                // T of the voltage in the middle of the step.
+                let [gone, _] = relaxed(self.ratio(*state, away));
+                part = relaxed(self.ratio(*state - 0.5 * gone * away, away));
+            }
+            let [gone, mean] = part;
             *state = *volts + away * (1.0 - gone);
             *volts += away * mean;
         }
     }
 }
 
-/// The state is the voltage and T times its rate (V) at the end of the last step; exact for voltages that are constant over a step and not crossed
-/// within it.
+/// The state is the voltage and T of falling small voltages times its rate (V) at the end of the last step; exact for voltages that are constant over a step and not
+/// crossed within it, if T does not grow, otherwise of first order in it.
 struct SecondOrder {
-    /// T (s).
-    time: f64,
+    /// T, r and g.
+    lag: Lag,
     /// b.
     inertia: f64,
-    /// r.
-    rising: f64,
     state: Vec<[f64; 2]>,
 }
 
@@ -143,11 +174,18 @@ impl SignalStage for SecondOrder {
 
     fn pass(&mut self, dt: f64, volts: &mut [f64]) {
         let b = self.inertia;
-        let falling = Step::new(dt / self.time, b);
-        let rising = if self.rising == 1.0 { falling } else { Step::new(falling.length / self.rising, b) };
+        let length = dt / self.lag.time;
+        let falling = Step::new(length, b);
+        let rising = if self.lag.rising == 1.0 { falling } else { Step::new(length / self.lag.rising, b) };
         for ([voltage, rate], volts) in self.state.iter_mut().zip(volts) {
             let away = *voltage - *volts;
-            let (Step { length, m, cosine, sine }, ratio) = if away < 0.0 { (rising, self.rising) } else { (falling, 1.0) };
+            let ratio = self.lag.ratio(*voltage, away);
+            let step = match away < 0.0 {
+                _ if self.lag.growth != 0.0 => Step::new(length / ratio, b),
+                true => rising,
+                false => falling,
+            };
+            let Step { length, m, cosine, sine } = step;
             let own = ratio * *rate;
             let next = [cosine * away + sine * (m * away + own), cosine * own - sine * (away / b + m * own)];
             // The integral of the equation over the step.
@@ -170,9 +208,31 @@ impl SignalStage for SecondOrder {
 mod tests {
     use super::*;
 
+    fn constant(time: f64, rising: f64) -> Lag {
+        Lag { time, rising, growth: 0.0 }
+    }
+
+    #[test]
+    fn a_capacitance_that_grows_charges_as_its_equation_says() {
+        // From 0 towards u with T (1 + g v): t/T = −(1 + g u) ln(1 − v/u) − g v.
+        let [time, growth, u] = [0.01, 1e-3, 800.0];
+        let reached = |steps: u32| {
+            let mut lag = Follower::new(Lag { growth, ..constant(time, 1.0) }, 1);
+            (0..steps).for_each(|_| lag.pass(0.02 / f64::from(steps), &mut [u]));
+            lag.state()[0]
+        };
+        let when = |v: f64| time * (-(1.0 + growth * u) * (-v / u).ln_1p() - growth * v);
+        let [coarse, fine] = [20, 40].map(|steps| when(reached(steps)) - 0.02);
+        assert!(coarse.abs() < 2e-5 && (3.0..5.0).contains(&(coarse / fine)), "{coarse:e} {fine:e}");
+        // With little inertia the second order does the same.
+        let mut second = SecondOrder { lag: Lag { growth, ..constant(time, 1.0) }, inertia: 1e-4, state: vec![[0.0; 2]] };
+        (0..2_000).for_each(|_| second.pass(1e-5, &mut [u]));
+        assert!((when(second.state[0][0]) - 0.02).abs() < 2e-5, "{}", when(second.state[0][0]));
+    }
+
     #[test]
     fn two_equal_lags_in_a_row_are_an_inertia_of_a_quarter() {
-        let mut second = SecondOrder { time: 0.02, inertia: 0.25, rising: 1.0, state: vec![[0.0; 2]] };
+        let mut second = SecondOrder { lag: constant(0.02, 1.0), inertia: 0.25, state: vec![[0.0; 2]] };
         let mut sum = 0.0;
         for _ in 0..25 {
             let mut volts = [100.0];
@@ -190,7 +250,7 @@ mod tests {
     fn an_amplifier_that_overshoots_does_so_by_its_damping_ratio() {
         // b T² = 1/ω², T = 2 ζ/ω: b = 1/(4 ζ²).
         let ratio = 0.5_f64;
-        let mut second = SecondOrder { time: 0.02, inertia: 0.25 / (ratio * ratio), rising: 1.0, state: vec![[0.0; 2]] };
+        let mut second = SecondOrder { lag: constant(0.02, 1.0), inertia: 0.25 / (ratio * ratio), state: vec![[0.0; 2]] };
         let mut largest = 0.0_f64;
         for _ in 0..16_000 {
             second.pass(5e-5, &mut [100.0]);
@@ -203,14 +263,14 @@ mod tests {
 
     #[test]
     fn a_source_and_a_sink_may_differ() {
-        let mut lag = Follower::new(Lag { time: 0.02, rising: 0.5 }, 1);
+        let mut lag = Follower::new(constant(0.02, 0.5), 1);
         (0..25).for_each(|_| lag.pass(1e-3, &mut [100.0]));
         let risen = 100.0 * (1.0 - (-2.5_f64).exp());
         assert!((lag.state()[0] - risen).abs() < 1e-12);
         (0..25).for_each(|_| lag.pass(1e-3, &mut [0.0]));
         assert!((lag.state()[0] - risen * (-1.25_f64).exp()).abs() < 1e-12);
         let after = |time: f64, rising: f64, from: [f64; 2], to: f64| {
-            let mut second = SecondOrder { time, inertia: 0.2, rising, state: vec![from] };
+            let mut second = SecondOrder { lag: constant(time, rising), inertia: 0.2, state: vec![from] };
             (0..10).for_each(|_| second.pass(1e-3, &mut [to]));
             second.state[0]
         };
@@ -225,7 +285,7 @@ mod tests {
 
     #[test]
     fn a_step_response_is_the_exponential() {
-        let mut lag = Follower::new(Lag { time: 0.01, rising: 1.0 }, 1);
+        let mut lag = Follower::new(constant(0.01, 1.0), 1);
         for _ in 0..25 {
             lag.pass(1e-3, &mut [100.0]);
         }
