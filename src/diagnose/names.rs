@@ -36,7 +36,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         },
         "creep" => match given("rungs_per_decade") {
             Some(0.0) => "one time constant".into(),
-            Some(_) if fitted.nth(1) == Some("fastest_s") => "logarithmic from a time on".into(),
+            Some(_) if fitted.nth(2) == Some("fastest_s") => "from a time on that is fitted".into(),
             Some(1.0) if given("fastest_s").is_some() => "one time constant in a decade, from 10 ms on".into(),
             Some(1.0) => "one time constant in a decade".into(),
             Some(count) => format!("{count} time constants in a decade"),

@@ -67,7 +67,11 @@ pub const CREEP: Effect = Effect {
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
-        variants: &[],
+        variants: &[Form {
+            fitted: &[("per_decade", 0.02), ("power", 0.2), ("fastest_s", 0.3)],
+            starts: &[&[0.02, 0.0, 0.3], &[0.02, 0.0, 3.0]],
+            given: &[("rungs_per_decade", 2.0)],
+        }],
         forms: &[
             Form {
                 fitted: &[("per_decade", 0.02), ("power", 0.2)],
@@ -88,11 +92,6 @@ pub const CREEP: Effect = Effect {
                 fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
                 starts: &[&[0.02, 0.3], &[0.02, 3.0]],
                 given: &[("rungs_per_decade", 0.0)],
-            },
-            Form {
-                fitted: &[("per_decade", 0.02), ("fastest_s", 0.3)],
-                starts: &[&[0.02, 0.3], &[0.02, 3.0]],
-                given: &[("rungs_per_decade", 2.0)],
             },
         ],
     },
