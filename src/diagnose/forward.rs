@@ -80,13 +80,9 @@ impl Search<'_> {
     /// A model, or the best name of its last free form's place with all that suits the name, if the free form leaves much and the name then costs less: times of jumps
     /// that suit the model without a limit of the rate let a linear filter look better.
     fn or_a_name_once_settled(&mut self, free: Scored, trials: &[Trial]) -> Scored {
-        let names = trials.iter().map(|other| &other.scored);
-        let Some(name) = names.into_iter().find(|name| self.ends_free(free.model()) && self.is_name_of(&free, name)) else {
-            return free;
-        };
-        if self.above(&free) <= VISIBLE {
-            return free;
-        }
+        let leaves_much = self.ends_free(free.model()) && self.above(&free) > VISIBLE;
+        let mut names = trials.iter().map(|trial| &trial.scored);
+        let Some(name) = names.find(|name| leaves_much && self.is_name_of(&free, name)) else { return free };
         let before = self.estimator.state();
         match self.settled(name.clone()).filter(|name| self.cost(name) < self.cost(&free)) {
             Some(name) => {
