@@ -70,7 +70,6 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 31] = [
     ("free-drag", &[("linear", 20.0), ("cubic", 10.0)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("damping_s", 5e-3)]),
     ("air-drag", &[("drag_coefficient", 40.0), ("exponent", 1.5)]),
-    ("air-drag", &[("drag_coefficient", 40.0), ("linear_m_per_s", 0.5)]),
     ("stiffness-softening", &[("softening_mm2", 2000.0), ("exponent", 1.0)]),
     ("structural-damping", &[("loss_factor", 0.05), ("exponent", 0.3)]),
     ("dry-friction", &[("moment_mn_m", 0.3), ("presliding_per_m", 0.5)]),
@@ -100,6 +99,7 @@ const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 31] = [
         "free-joint-friction",
         &[("bend_range_per_m", 4.0), ("moment_1_mn_m", 0.02), ("moment_3_mn_m", 0.1), ("moment_6_mn_m", 0.05)],
     ),
+    ("air-drag", &[("drag_coefficient", 40.0), ("linear_m_per_s", 0.5)]),
 ];
 
 #[test]
