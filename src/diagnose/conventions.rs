@@ -1,7 +1,7 @@
 //! Values that are a matter of convention beside other causes.
 
 use super::search::{LEAST_GAIN, VISIBLE};
-use crate::effects::{Applied, secants};
+use crate::effects::{Action, Applied, secants};
 
 /// True if a gain is no cause of its own among `effects` that leave `left` (χ² per value above 1).
 ///
@@ -31,10 +31,11 @@ const OPENINGS: f64 = 2.0;
 pub(super) fn is_curve_a_convention(effects: &[Applied], left: f64) -> bool {
     let find = |id: &str| effects.iter().find(|applied| applied.effect.id == id);
     let (Some(hysteresis), Some(curve)) = (find("hysteresis"), find("field-dependent-gain")) else { return false };
-    let of = |name: &str| curve.get(name).unwrap_or_default();
+    let Action::Voltages(stage) = curve.effect.action else { return false };
     let gain = |volts: f64| {
-        let kv = 1e-3 * volts;
-        (1.0 + of("slope_per_kv") * kv + of("curvature_per_kv2") * kv * kv) * (volts / of("reference_v")).powf(of("exponent"))
+        let mut out = [volts];
+        stage(&curve.values, 1, 0.0).settle(&mut out);
+        out[0] / volts
     };
     let [least, most] = STROKES;
     let along = (0..=10).map(|k| gain(least + 0.1 * f64::from(k) * (most - least)) / gain(most));
