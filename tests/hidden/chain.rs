@@ -184,7 +184,8 @@ impl<'a> Chain<'a> {
         let nodes = [G, 0.5 * (1.0 + G), 1.0];
         let d = self.freedoms();
         let lossy = self.nature.loss > 0.0;
-        let remembers = self.nature.other.joint.is_some_and(|law| law.remembers());
+        let other = &self.nature.other;
+        let remembers = [other.joint, other.clamp].into_iter().flatten().any(|law| law.remembers());
         let (mut rates, mut accelerations) = ([[0.0; SIZE]; 2], [[0.0; SIZE]; 2]);
         let mut slopes = [[[0.0; BRANCHES.len()]; SIZE]; 2];
         let mut changes = [[[0.0; MEMORY]; SIZE]; 2];

@@ -35,6 +35,11 @@ pub fn threshold_growth(slope: f64, _: f64) -> Operator {
     curve(move |v| v * (1.0 + 1e-3 * slope * (v.abs() - 350.0).max(0.0)))
 }
 
+/// The charge constant grows as domains nucleate, with `exp(-600 V / |V|)` of the size: Merz, Phys. Rev. 95 (1954) 690.
+pub fn nucleated_growth(share: f64, _: f64) -> Operator {
+    curve(move |v| v * (1.0 + share * (-600.0 / v.abs()).exp()))
+}
+
 /// The gain of positive voltages sets in over 60 V instead of at once.
 pub fn smooth_polarity(excess: f64, _: f64) -> Operator {
     curve(move |v| v * (1.0 + 0.5 * excess * (1.0 + (v / 60.0).tanh())))
@@ -56,6 +61,13 @@ pub fn dead_zone(volts: f64, _: f64) -> Operator {
     const ROUND: f64 = 8.0;
     let passed = move |v: f64| ROUND * (softplus((v - volts) / ROUND) - softplus(-volts / ROUND));
     curve(move |v| if v > 0.0 { passed(v) } else { v })
+}
+
+/// Positive voltages turn domains back, each at its own voltage about 230 V (Hwang, Lynch and McMeeking, Acta Metall. Mater. 43 (1995) 2073). The size is
+/// the stroke of all of them in V.
+pub fn turned_domains(stroke: f64, _: f64) -> Operator {
+    let turned = |v: f64| 1.0 / (1.0 + (-(v - 230.0) / 40.0).exp());
+    curve(move |v| if v > 0.0 { v + stroke * (turned(v) - turned(0.0)) } else { v })
 }
 
 /// Straight up to 0.6 of the limit, then a hyperbolic tangent towards it: soft clipping.
@@ -97,4 +109,10 @@ pub fn varistor(limit: f64, _: f64) -> Operator {
         }
         limit * left.copysign(v)
     })
+}
+
+/// A suppressor diode behind a resistor: beyond its breakdown, which is the size, its own resistance lets a fifth of the excess through (clamping voltage
+/// against current in data sheets of such diodes).
+pub fn suppressor(limit: f64, _: f64) -> Operator {
+    curve(move |v| if v.abs() > limit { (limit + 0.2 * (v.abs() - limit)).copysign(v) } else { v })
 }

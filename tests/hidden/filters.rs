@@ -70,6 +70,23 @@ pub fn growing_capacitance(time: f64, first: f64) -> Operator {
     })
 }
 
+/// Electrodes of poor conductance over the capacitance, fed at one end: the mean voltage of a line without inductance, `tanh(sqrt(s T)) / sqrt(s T)` (Ghausi and
+/// Kelly, Introduction to Distributed-Parameter Networks, 1968). The size is the resistance times the capacitance of the whole line, s.
+pub fn resistive_electrodes(time: f64, first: f64) -> Operator {
+    const MODES: usize = 8;
+    let root = |k: usize| (k as f64 + 0.5) * std::f64::consts::PI;
+    let (mut states, mut before) = ([first; MODES], first);
+    Box::new(move |v, dt| {
+        let mut now = v;
+        for (k, state) in states.iter_mut().enumerate() {
+            *state = follow(*state, before, v, dt, time / root(k).powi(2));
+            now += 2.0 / root(k).powi(2) * (*state - v);
+        }
+        before = v;
+        now
+    })
+}
+
 /// The current of a differential pair, a hyperbolic tangent of its input (Gray and Meyer), charges the load; the size is the limit in V/s.
 pub fn tanh_rate(limit: f64, first: f64) -> Operator {
     const TIME: f64 = 1e-4;
@@ -112,6 +129,18 @@ pub fn peak_current(limit: f64, first: f64) -> Operator {
             let used = change.abs() / (limit * dt);
             load = follow(load, used, used, dt, 0.01);
         }
+        now
+    })
+}
+
+/// A converter that charges by pulses of the same energy (flyback chargers of capacitors, as the LT3750): the rate is inversely proportional to the voltage and
+/// at most three times the size, which is the rate at 750 V and that of a sink of constant current, V/s.
+pub fn equal_pulses(limit: f64, first: f64) -> Operator {
+    let mut now = first;
+    Box::new(move |v, dt| {
+        let is_charging = (v - now) * now >= 0.0;
+        let most = limit * dt * if is_charging { (750.0 / now.abs()).min(3.0) } else { 1.0 };
+        now += (v - now).clamp(-most, most);
         now
     })
 }

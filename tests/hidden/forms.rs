@@ -142,9 +142,9 @@ const fn form(id: &'static str, place: Place, sizes: [(f64, f64); 2], law: Law) 
 }
 
 /// Forms of each effect.
-const EACH: usize = 4;
+const EACH: usize = 5;
 
-/// Four forms of each effect, in order. The ids of the fourth ones do not say what they are, so that whoever runs them can judge blind.
+/// Five forms of each effect, in order. The ids of the fourth and fifth ones do not say what they are, so that whoever runs them can judge blind.
 pub const FORMS: &[Form] = &[
     form(
         "field-dependent-gain~plateaus",
@@ -171,6 +171,12 @@ pub const FORMS: &[Form] = &[
         Law::Actuation(curves::threshold_growth),
     ),
     form(
+        "field-dependent-gain~fifth",
+        Place::VoltageCurve,
+        [(0.0379, 0.0657), (0.112, 0.235)],
+        Law::Actuation(curves::nucleated_growth),
+    ),
+    form(
         "stiffness-softening~strain",
         Place::JointMomentOfAngle,
         [(0.0372, 0.0636), (0.107, 0.217)],
@@ -194,10 +200,17 @@ pub const FORMS: &[Form] = &[
         [(0.00536, 0.00921), (0.0156, 0.032)],
         Law::Joint(Moment::SofteningByKraus),
     ),
+    form(
+        "stiffness-softening~fifth",
+        Place::JointMomentOfAngle,
+        [(0.0052, 0.00892), (0.0151, 0.0309)],
+        Law::Joint(Moment::SofteningByTension),
+    ),
     form("dry-friction~dahl", Place::JointMemory, [(1740.0, 3050.0), (5310.0, 11300.0)], Law::Joint(Moment::Dahl)),
     form("dry-friction~stribeck", Place::JointMomentOfRate, [(1670.0, 2950.0), (5150.0, 10900.0)], Law::Joint(Moment::Stribeck)),
     form("dry-friction~iwan", Place::JointMemory, [(1790.0, 3110.0), (5390.0, 11400.0)], Law::Joint(Moment::Iwan)),
     form("dry-friction~fourth", Place::JointMemory, [(1660.0, 2920.0), (5090.0, 10800.0)], Law::Joint(Moment::LuGre)),
+    form("dry-friction~fifth", Place::JointMemory, [(1660.0, 2920.0), (5090.0, 10800.0)], Law::Joint(Moment::AgeingContacts)),
     form("creep~stretched", Place::VoltageMemory, [(0.0568, 0.0981), (0.168, 0.349)], Law::Actuation(memories::stretched_creep)),
     form(
         "creep~two-elements",
@@ -207,6 +220,7 @@ pub const FORMS: &[Form] = &[
     ),
     form("creep~thresholds", Place::VoltageMemory, [(0.0129, 0.0222), (0.038, 0.079)], Law::Actuation(memories::threshold_creep)),
     form("creep~fourth", Place::VoltageMemory, [(0.0772, 0.133), (0.228, 0.474)], Law::Actuation(memories::activated_creep)),
+    form("creep~fifth", Place::VoltageMemory, [(0.0197, 0.0339), (0.0581, 0.121)], Law::Actuation(memories::quadratic_creep)),
     form(
         "structural-damping~fractional",
         Place::JointMemory,
@@ -216,10 +230,17 @@ pub const FORMS: &[Form] = &[
     form("structural-damping~zener", Place::JointMemory, [(0.00608, 0.0106), (0.0187, 0.0417)], Law::Joint(Moment::Zener)),
     form("structural-damping~reid", Place::JointMomentOfRate, [(0.0069, 0.0123), (0.0218, 0.0499)], Law::Joint(Moment::Reid)),
     form("structural-damping~fourth", Place::JointMemory, [(0.00817, 0.0143), (0.025, 0.0551)], Law::Joint(Moment::BroadPeak)),
+    form(
+        "structural-damping~fifth",
+        Place::JointMemory,
+        [(0.00492, 0.00869), (0.0154, 0.0355)],
+        Law::Joint(Moment::HystereticDamper),
+    ),
     form("hysteresis~preisach", Place::VoltageMemory, [(0.0728, 0.124), (0.206, 0.402)], Law::Actuation(memories::preisach)),
     form("hysteresis~duhem", Place::VoltageMemory, [(0.0148, 0.0274), (0.0522, 0.143)], Law::Actuation(memories::duhem)),
     form("hysteresis~rayleigh", Place::VoltageMemory, [(0.0363, 0.0626), (0.107, 0.222)], Law::Actuation(memories::rayleigh)),
     form("hysteresis~fourth", Place::VoltageMemory, [(0.103, 0.174), (0.287, 0.547)], Law::Actuation(memories::jiles_atherton)),
+    form("hysteresis~fifth", Place::VoltageMemory, [(0.0258, 0.0447), (0.077, 0.163)], Law::Actuation(memories::mapped_branches)),
     form(
         "polarity-asymmetry~smooth",
         Place::VoltageCurve,
@@ -245,6 +266,12 @@ pub const FORMS: &[Form] = &[
         Law::Actuation(curves::levelling_polarity),
     ),
     form(
+        "polarity-asymmetry~fifth",
+        Place::VoltageCurve,
+        [(170.0, 293.0), (501.0, 1040.0)],
+        Law::Actuation(curves::turned_domains),
+    ),
+    form(
         "clamp-compliance~damper",
         Place::Mounting,
         [(0.026, 0.0449), (0.0771, 0.163)],
@@ -268,10 +295,12 @@ pub const FORMS: &[Form] = &[
         [(0.0189, 0.0324), (0.0549, 0.111)],
         Law::Clamp(|value| Moment::ClampOneSided(2e-3 * value)),
     ),
+    form("clamp-compliance~fifth", Place::Mounting, [(0.0485, 0.0834), (0.141, 0.288)], Law::Clamp(|_| Moment::ClampPads(1.0))),
     form("air-drag~power", Place::Air, [(1.19, 2.12), (3.84, 9.33)], Law::Air(Air::Power)),
     form("air-drag~fence", Place::Air, [(0.777, 1.41), (2.6, 6.74)], Law::Air(Air::Fence)),
     form("air-drag~mixed", Place::Air, [(0.459, 0.825), (1.51, 3.81)], Law::Air(Air::Mixed)),
     form("air-drag~fourth", Place::Air, [(0.455, 0.821), (1.51, 3.87)], Law::Air(Air::Reynolds)),
+    form("air-drag~fifth", Place::Air, [(1.42, 2.53), (4.57, 11.1)], Law::Air(Air::Bending)),
     form(
         "driver-lag~second-order",
         Place::DriveFilter,
@@ -291,12 +320,20 @@ pub const FORMS: &[Form] = &[
         [(0.000161, 0.000278), (0.000476, 0.000997)],
         Law::Driver(filters::growing_capacitance),
     ),
+    form(
+        "driver-lag~fifth",
+        Place::DriveFilter,
+        [(0.000759, 0.00132), (0.00225, 0.00472)],
+        Law::Driver(filters::resistive_electrodes),
+    ),
     form("slew-limit~tanh", Place::DriveFilter, [(3.03e5, 1.64e5), (94600.0, 58200.0)], Law::Driver(filters::tanh_rate)),
     form("slew-limit~unequal", Place::DriveFilter, [(2.26e5, 1.3e5), (78400.0, 49200.0)], Law::Driver(filters::unequal_rates)),
     form("slew-limit~droop", Place::DriveFilter, [(3.52e5, 2.03e5), (1.35e5, 82000.0)], Law::Driver(filters::drooping_rate)),
     form("slew-limit~fourth", Place::DriveFilter, [(1.52e5, 93200.0), (72900.0, 50200.0)], Law::Driver(filters::peak_current)),
+    form("slew-limit~fifth", Place::DriveFilter, [(1.98e5, 1.15e5), (77300.0, 51900.0)], Law::Driver(filters::equal_pulses)),
     form("saturation~tanh", Place::VoltageCurve, [(1570.0, 1440.0), (1300.0, 1080.0)], Law::Driver(curves::tanh_limit)),
     form("saturation~parabola", Place::VoltageCurve, [(1430.0, 1330.0), (1220.0, 1040.0)], Law::Driver(curves::parabolic_limit)),
     form("saturation~sagging", Place::DriveFilter, [(1510.0, 1420.0), (1310.0, 1110.0)], Law::Driver(filters::sagging_supply)),
     form("saturation~fourth", Place::VoltageCurve, [(1670.0, 1530.0), (1380.0, 1150.0)], Law::Driver(curves::varistor)),
+    form("saturation~fifth", Place::VoltageCurve, [(1350.0, 1260.0), (1140.0, 957.0)], Law::Driver(curves::suppressor)),
 ];

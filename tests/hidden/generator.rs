@@ -8,7 +8,7 @@
 //! friction follows an arc tangent, drag is a quadrature along each rod, a saturating amplifier has a rounded knee, and the gain
 //! that grows with the field is smooth at zero. What they share is the physics: a wrong sign or factor shows as a misfit.
 //!
-//! `OUTSIDE` are effects whose equations no entry of the program's library has; some have a namesake there. forms.rs has four other equations for each of twelve of the effects, bench.rs
+//! `OUTSIDE` are effects whose equations no entry of the program's library has; some have a namesake there. forms.rs has five other equations for each of twelve of the effects, bench.rs
 //! faults of a bench that come on top of anything, cases.rs the ids of all that can be hidden.
 
 #![allow(dead_code)] // every test uses a part of it

@@ -64,6 +64,14 @@ pub fn activated_creep(share: f64, first: f64) -> Operator {
     })
 }
 
+/// The amount of creep grows with the square of the field, as domains switch more readily towards the coercive one: Zhou and Kamlah, Acta Mater. 54
+/// (2006) 1389. The size is the share of each element at 1000 V.
+pub fn quadratic_creep(share: f64, first: f64) -> Operator {
+    let amount = |v: f64| v * v.abs() / 1000.0;
+    let mut slow = branches(amount(first), [0.2, 1.0, 5.0].map(|time| [time, share]).to_vec());
+    Box::new(move |v, dt| v + slow(amount(v), dt) - amount(v))
+}
+
 /// Makes the answer to a stroke from 0 to -1500 V as large as the stroke.
 fn with_full_stroke(make: impl Fn(f64) -> Operator, first: f64) -> Operator {
     let mut fresh = make(0.0);
@@ -128,6 +136,24 @@ pub fn duhem(width: f64, first: f64) -> Operator {
     with_full_stroke(make, first)
 }
 
+/// Adds the point `now` to the turning points, `[volts, answer]`, if `v` lies back from there, and takes out those that are passed: Madelung's rules.
+fn turn(turns: &mut Vec<[f64; 2]>, now: [f64; 2], v: f64) {
+    let last = turns[turns.len() - 1][0];
+    if (v - now[0]) * (now[0] - last) < 0.0 {
+        turns.push(now);
+    }
+    loop {
+        let count = turns.len();
+        if count >= 3 && (v - turns[count - 2][0]) * (turns[count - 2][0] - turns[count - 1][0]) > 0.0 {
+            turns.truncate(count - 2);
+        } else if count == 2 && (v - turns[0][0]).abs() > (turns[1][0] - turns[0][0]).abs() {
+            turns.pop();
+        } else {
+            break;
+        }
+    }
+}
+
 /// Rayleigh's law: parabolic branches from the turning points, which are wiped out as they are passed (Madelung's rules; Damjanovic, Rep. Prog.
 /// Phys. 61 (1998) 1267). The size is the share of the irreversible part in a stroke of 1500 V.
 pub fn rayleigh(share: f64, first: f64) -> Operator {
@@ -139,20 +165,28 @@ pub fn rayleigh(share: f64, first: f64) -> Operator {
         base + (v - from) * (1.0 - share + part * share * (v - from).abs() / 1500.0)
     };
     Box::new(move |v, _| {
-        let last = turns[turns.len() - 1][0];
-        if (v - now[0]) * (now[0] - last) < 0.0 {
-            turns.push(now);
-        }
-        loop {
-            let count = turns.len();
-            if count >= 3 && (v - turns[count - 2][0]) * (turns[count - 2][0] - turns[count - 1][0]) > 0.0 {
-                turns.truncate(count - 2);
-            } else if count == 2 && (v - turns[0][0]).abs() > (turns[1][0] - turns[0][0]).abs() {
-                turns.pop();
-            } else {
-                break;
-            }
-        }
+        turn(&mut turns, now, v);
+        now = [v, branch(&turns, v)];
+        now[1]
+    })
+}
+
+/// Every branch is the same cubic between the point where it turned and the one before, or the mirror image of a first turn, so that loops of all widths are
+/// alike: Bashash and Jalili, J. Dyn. Syst. Meas. Control 130 (2008) 031008. The size is half the gain that is lost at a turn.
+pub fn mapped_branches(share: f64, first: f64) -> Operator {
+    let mut turns = vec![[first, first]];
+    let mut now = [first, first];
+    let branch = move |turns: &[[f64; 2]], v: f64| {
+        let ([from, base], before) = match *turns {
+            [.., before, last] if turns.len() > 2 => (last, before),
+            [start, last] => (last, [2.0 * start[0] - last[0], 2.0 * start[1] - last[1]]),
+            _ => return v,
+        };
+        let part = (v - from) / (before[0] - from);
+        base + (before[1] - base) * part * (1.0 - share * (1.0 - part) * (2.0 - part))
+    };
+    Box::new(move |v, _| {
+        turn(&mut turns, now, v);
         now = [v, branch(&turns, v)];
         now[1]
     })

@@ -10,6 +10,9 @@ const CORNER_PER_CM: f64 = 0.012;
 /// Curvature at which half of the loss of stiffness is reached, 1/cm, and the power with which it comes (Kraus).
 const KRAUS_PER_CM: f64 = 0.015;
 const KRAUS_POWER: f64 = 1.2;
+/// Curvatures over which ceramics soften under tension and under compression, 1/cm.
+const TENSION_PER_CM: f64 = 0.02;
+const COMPRESSION_PER_CM: f64 = 0.06;
 /// Angle over which friction builds up before it slides, rad (Dahl), and the largest such angle of the Jenkins elements.
 const PRESLIDING: f64 = 0.002;
 const JENKINS: usize = 6;
@@ -17,6 +20,10 @@ const LARGEST_SLIP: f64 = 0.006;
 /// Deflection of the bristles from which they slide, rad, and the time of their damping, s (LuGre).
 const BRISTLE: f64 = 0.001;
 const BRISTLE_TIME: f64 = 0.001;
+/// Angle over which contacts are renewed, rad, the age from which they gain strength, s, and their gain with the logarithm of the age.
+const CONTACT: f64 = 0.001;
+const CONTACT_AGE: f64 = 0.001;
+const AGEING: f64 = 0.05;
 /// Speeds over which friction turns, and over which its static excess vanishes, rad/s.
 const TURN_SPEED: f64 = 0.06;
 const STRIBECK_SPEED: f64 = 0.2;
@@ -29,6 +36,12 @@ const BROAD_TIME: f64 = 0.02;
 const BROAD_ORDER: f64 = 0.5;
 /// Time of the one Maxwell element, s: 10 Hz.
 const ZENER_TIME: f64 = 0.0159;
+/// Time over which the frequency of the motion is taken, s, and the frequency, rad/s, of motions of less than an angle, rad.
+const MEAN_TIME: f64 = 0.1;
+const REST_FREQUENCY: f64 = 100.0;
+const REST_ANGLE: f64 = 1e-4;
+/// Time over which pads of a clamp give way, s.
+const PAD_TIME: f64 = 0.05;
 /// Softness of the play of a clamp at its middle.
 const PLAY_SHARE: f64 = 0.9;
 /// By how much a clamp is stiffer and softer than its mean towards either side.
@@ -46,6 +59,8 @@ pub enum Moment {
     /// Stiffness falls between two plateaus as that of a filled polymer, here the bond: Kraus, J. Appl. Polym. Sci. Appl. Polym. Symp. 39 (1984) 75; the
     /// share lost.
     SofteningByKraus(f64),
+    /// Ceramics soften under tension long before they do under compression: Fett, Mueller, Munz and Thun, J. Mater. Sci. Lett. 17 (1998) 261; the share lost.
+    SofteningByTension(f64),
     /// Friction with a static excess: Stribeck's curve, regularised by a root (Armstrong-Helouvry, 1991). Moments in dyn cm from here.
     Stribeck(f64),
     /// Dahl's friction with presliding.
@@ -54,6 +69,8 @@ pub enum Moment {
     Iwan(f64),
     /// Bristles with Stribeck's curve: Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Autom. Control 40 (1995) 419.
     LuGre(f64),
+    /// Contacts that gain strength with their age until sliding renews them: Dieterich, J. Geophys. Res. 84 (1979) 2161; Ruina, ibid. 88 (1983) 10359.
+    AgeingContacts(f64),
     /// A fractional derivative of order 0.2, by a dense ladder (Bagley and Torvik, J. Rheol. 27 (1983) 201); share of the stiffness at 1 rad/s.
     Fractional(f64),
     /// The standard linear solid: one Maxwell element; its share of the stiffness.
@@ -62,6 +79,9 @@ pub enum Moment {
     BroadPeak(f64),
     /// A loss in proportion to the angle and against the motion: Reid, J. R. Aeronaut. Soc. 60 (1956) 283; share of the stiffness.
     Reid(f64),
+    /// A damper in inverse proportion to the frequency of the motion at the time, which is that of its recent mean squares: the hysteretic damping of Bishop,
+    /// J. R. Aeronaut. Soc. 59 (1955) 738; share of the stiffness.
+    HystereticDamper(f64),
     /// The clamp has a damper; its time in s.
     ClampDamper(f64),
     /// The clamp hardens with the cube of its angle; the angle in rad at which the cube is as large as the linear part.
@@ -70,6 +90,8 @@ pub enum Moment {
     ClampPlay(f64),
     /// The jaws of the clamp give unlike to either side, a bilinear spring: Shaw and Holmes, J. Sound Vib. 90 (1983) 129; the angle in rad over which it turns.
     ClampOneSided(f64),
+    /// The clamp has pads of rubber or plastic, stiffer against fast moments: a standard linear solid; the stiffness that relaxes over the lasting one.
+    ClampPads(f64),
 }
 
 /// What a joint does: angles in rad, speed in rad/s, stiffness in dyn cm/rad, and its memory before a step with the step's length.
@@ -128,12 +150,23 @@ impl Moment {
                 | Moment::Fractional(_)
                 | Moment::Zener(_)
                 | Moment::BroadPeak(_)
+                | Moment::AgeingContacts(_)
+                | Moment::HystereticDamper(_)
+                | Moment::ClampPads(_)
         )
     }
 
     /// True if it turns so sharply that it needs short steps.
     pub fn is_sharp(&self) -> bool {
-        matches!(self, Moment::Stribeck(_) | Moment::Dahl(_) | Moment::Iwan(_) | Moment::LuGre(_) | Moment::Reid(_))
+        matches!(
+            self,
+            Moment::Stribeck(_)
+                | Moment::Dahl(_)
+                | Moment::Iwan(_)
+                | Moment::LuGre(_)
+                | Moment::AgeingContacts(_)
+                | Moment::Reid(_)
+        )
     }
 
     /// The memory after a step, by the implicit Euler method.
@@ -143,6 +176,15 @@ impl Moment {
             Moment::Dahl(_) => after[0] = (before[0] + step * speed) / (1.0 + step * speed.abs() / PRESLIDING),
             Moment::LuGre(_) => after[0] = (before[0] + step * speed) / (1.0 + step * speed.abs() / bristle_limit(speed)),
             Moment::Zener(_) => after[0] = (before[0] + step * speed) / (1.0 + step / ZENER_TIME),
+            Moment::ClampPads(_) => after[0] = (before[0] + step * speed) / (1.0 + step / PAD_TIME),
+            Moment::AgeingContacts(_) => after[0] = (before[0] + step) / (1.0 + step * speed.abs() / CONTACT),
+            Moment::HystereticDamper(_) => {
+                // The angle from its mean, and the mean squares of that and of the speed.
+                let part = step / MEAN_TIME;
+                after[0] = (before[0] + step * speed) / (1.0 + part);
+                after[1] = (before[1] + part * after[0] * after[0]) / (1.0 + part);
+                after[2] = (before[2] + part * speed * speed) / (1.0 + part);
+            }
             Moment::Iwan(_) => {
                 for (i, place) in after.iter_mut().enumerate().take(JENKINS) {
                     *place = (*place + step * speed).clamp(-jenkins_limit(i), jenkins_limit(i));
@@ -164,7 +206,8 @@ impl Moment {
             Moment::SofteningByStrain(_)
             | Moment::SofteningToPlateau(_)
             | Moment::SofteningAtCorner(_)
-            | Moment::SofteningByKraus(_) => self.softening(motion),
+            | Moment::SofteningByKraus(_)
+            | Moment::SofteningByTension(_) => self.softening(motion),
             Moment::Stribeck(moment) => {
                 let speed = motion.speed;
                 let excess = 1.0 + STATIC_EXCESS * (-(speed / STRIBECK_SPEED).powi(2)).exp();
@@ -201,6 +244,10 @@ impl Moment {
                 let part = (curvature / KRAUS_PER_CM).powf(KRAUS_POWER);
                 share * part / (1.0 + part)
             }
+            Moment::SofteningByTension(share) => {
+                let range = if motion.stretch > 0.0 { TENSION_PER_CM } else { COMPRESSION_PER_CM };
+                share * -(-(curvature / range).powi(2)).exp_m1()
+            }
             Moment::SofteningAtCorner(share) => share * (1.0 - CORNER_PER_CM / curvature.max(CORNER_PER_CM)),
             _ => 0.0,
         };
@@ -227,9 +274,21 @@ impl Moment {
                 let sticking = (0..JENKINS).filter(|i| after[*i].abs() < jenkins_limit(*i)).count();
                 against_speed(spring * after[..JENKINS].iter().sum::<f64>(), spring * step * sticking as f64)
             }
-            Moment::Zener(share) => {
+            Moment::AgeingContacts(moment) => {
+                // A stage of the integrator may begin below zero.
+                let chord = moment * (1.0 + AGEING * (after[0].max(0.0) / CONTACT_AGE).ln_1p()) / motion.speed.hypot(TURN_SPEED);
+                against_speed(chord * motion.speed, chord)
+            }
+            Moment::HystereticDamper(share) => {
+                // As above.
+                let [angle, rate] = [after[1], after[2]].map(|square| square.max(0.0).sqrt());
+                let chord = motion.stiffness * share * angle.hypot(REST_ANGLE) / rate.hypot(REST_ANGLE * REST_FREQUENCY);
+                against_speed(chord * motion.speed, chord)
+            }
+            Moment::Zener(share) | Moment::ClampPads(share) => {
+                let time = if matches!(self, Moment::ClampPads(_)) { PAD_TIME } else { ZENER_TIME };
                 let part = motion.stiffness * share;
-                against_speed(part * after[0], part * step / (1.0 + step / ZENER_TIME))
+                against_speed(part * after[0], part * step / (1.0 + step / time))
             }
             Moment::Fractional(share) | Moment::BroadPeak(share) => {
                 let of = if matches!(self, Moment::BroadPeak(_)) { broad_rung } else { rung };
@@ -251,6 +310,8 @@ impl Moment {
 const EQUAL_SPEED: f64 = 100.0;
 /// Speed in cm/s of the Reynolds number 80, about the square of Abraham's constant 9.06.
 const LAYER_SPEED: f64 = 6.0;
+/// Speed in cm/s from which on things bend away.
+const BENDING_SPEED: f64 = 300.0;
 /// Arc length in cm beyond which a fence drags.
 const FENCE_CM: f64 = 8.0;
 
@@ -266,6 +327,9 @@ pub enum Air {
     Mixed(f64),
     /// A coefficient that falls with the Reynolds number as `(1 + const / sqrt(Re))^2`: Abraham, Phys. Fluids 13 (1970) 2194.
     Reynolds(f64),
+    /// Loose ends (leads, tape, markers) bend away from the flow, so that their drag passes from the square of the speed to the speed itself: Gosselin, de Langre
+    /// and Machado-Almeida, J. Fluid Mech. 650 (2010) 319.
+    Bending(f64),
 }
 
 impl Air {
@@ -276,6 +340,7 @@ impl Air {
             Air::Fence(factor) if arc_cm >= FENCE_CM => factor * speed * speed.abs(),
             Air::Fence(_) => 0.0,
             Air::Mixed(factor) => factor * speed * (speed.abs() + EQUAL_SPEED),
+            Air::Bending(factor) => factor * speed * speed.abs() / (1.0 + speed.abs() / BENDING_SPEED),
             Air::Reynolds(factor) => factor * speed * (speed.abs().sqrt() + LAYER_SPEED.sqrt()).powi(2),
         }
     }
