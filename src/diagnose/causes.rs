@@ -3,9 +3,9 @@
 use super::DiagnoseError;
 use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
-use super::naming::{self, Naming};
+use super::naming::{self, LEAST_TAKEN, Naming};
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, Trial};
+use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, Trial, VISIBLE};
 use super::smoothing::smoothed;
 use super::unseen::Unseen;
 use super::verdict::LEFT_SHARE;
@@ -34,6 +34,8 @@ pub(super) struct Causes {
     pub(super) spikes: usize,
     /// Share of what re-tuned constants leave that the causes leave before faults of the bench.
     pub(super) share_left: f64,
+    /// Cost of the model with faults of the bench where they do not explain what it leaves; infinite if there is none.
+    cost_with_faults: f64,
     /// χ² per value above 1 of the model with free forms; infinite without any.
     pub(super) open: f64,
     /// The places of every free form, and the names that were tried in its stead.
@@ -62,8 +64,9 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
         calibrated.clone()
     };
     search.set_unexplained(&start);
-    // Two causes that cost more than the bench's faults alone are not what is missing where these leave next to nothing.
-    let may_be_all = has_faults && search.share_left(calibrated) <= LEFT_SHARE;
+    // Two causes that cost more than the bench's faults alone are not what is missing where these leave next to nothing. Faults that follow what a driver does from run to
+    // run leave a small share of much, and yet structure.
+    let may_be_all = has_faults && search.share_left(calibrated) <= LEFT_SHARE && search.above(calibrated) <= VISIBLE;
     search.limit = if may_be_all { search.cost(calibrated) } else { f64::INFINITY };
     // Constants that stand in for faults may lead to where nothing can be simulated.
     let plain = match select(search, &start, is_insufficient) {
@@ -73,7 +76,8 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
     search.limit = f64::INFINITY;
     // Causes that leave next to nothing without any fault are no faults.
     let may_be_faults = |causes: &Causes| {
-        let is_dearer = causes.best.model().spread != without || search.cost(&causes.best) > search.cost(calibrated);
+        let own = search.cost(&causes.best);
+        let is_dearer = causes.best.model().spread != without || own > causes.cost_with_faults.min(search.cost(calibrated));
         has_faults && causes.share_left > SOUGHT && is_dearer
     };
     let mut causes = match plain {
@@ -81,6 +85,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
         plain => {
             (search.progress)("causes with faults of the bench in the way");
             let cost = plain.as_ref().map_or(f64::INFINITY, |plain| search.cost(&plain.best));
+            let above = plain.as_ref().map_or(f64::INFINITY, |plain| search.above(&plain.best));
             let after = (search.estimator.state(), search.split.clone());
             search.estimator.restore(before.0.clone());
             search.estimator.held_spread = None;
@@ -88,7 +93,10 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             search.set_unexplained(calibrated);
             let other = select(search, calibrated, is_insufficient)?;
             match plain {
-                Some(plain) if search.cost(&other.best) > cost + LEAST_COST => {
+                Some(plain)
+                    if search.cost(&other.best) > cost + LEAST_COST
+                        || (plain.best.model().spread == without && !do_faults_explain(search, &other.best, above)) =>
+                {
                     search.estimator.restore(after.0);
                     search.split = after.1;
                     search.set_unexplained(&start);
@@ -115,6 +123,12 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
         return find(search, calibrated, is_insufficient);
     }
     Ok(causes)
+}
+
+/// True if faults of the bench explain what a model without them leaves above the noise (χ² per value): but for what nobody sees, or [`LEAST_TAKEN`] of it. Others stand
+/// for a cause, which they follow from run to run, or for what its law does not follow.
+fn do_faults_explain(search: &Search, with: &Scored, left_without: f64) -> bool {
+    search.above(with) <= VISIBLE.max((1.0 - LEAST_TAKEN) * left_without)
 }
 
 /// True if a model with free forms predicts runs that are left out worse than re-tuned constants do. Runs that judge are not looked at.
@@ -164,6 +178,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
             replaced: Vec::new(),
             spikes: 0,
             share_left: 1.0,
+            cost_with_faults: f64::INFINITY,
             open: f64::INFINITY,
             nearest: Vec::new(),
         });
@@ -177,19 +192,41 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     best = search.resolve(best, Convergence::Rank);
     let share_left = search.share_left(&best);
     // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
-    if share_left > SOUGHT && search.estimator.held_spread.take().is_some() {
-        best = search.settle(best)?;
-        best = search.backward(best)?;
+    let (mut cost_with_faults, mut faults_come_last) = (f64::INFINITY, search.estimator.held_spread.is_some());
+    if share_left > SOUGHT && faults_come_last {
+        let (before, held) = (search.estimator.state(), search.estimator.held_spread.take());
+        let with = search.settle(best.clone())?;
+        faults_come_last = false;
+        if do_faults_explain(search, &with, search.above(&best)) {
+            best = search.backward(with)?;
+        } else {
+            cost_with_faults = search.cost(&with);
+            search.estimator.restore(before);
+            search.estimator.held_spread = held;
+        }
     }
 
     let (mut best, replaced) =
         if is_insufficient { (best, Vec::new()) } else { replace(search, best, calibrated.model().resolution)? };
-    let faults_come_last = search.estimator.held_spread.take().is_some();
+    if faults_come_last {
+        search.estimator.held_spread = None;
+    }
     if search.measure_noise(&best)? || faults_come_last {
         best = search.settle(best)?;
     }
+    search.estimator.held_spread = None;
     let coarse_total = best.total();
-    Ok(Causes { best, trials, replaced, coarse_total, spikes, share_left, open: f64::INFINITY, nearest: Vec::new() })
+    Ok(Causes {
+        best,
+        trials,
+        replaced,
+        coarse_total,
+        spikes,
+        share_left,
+        cost_with_faults,
+        open: f64::INFINITY,
+        nearest: Vec::new(),
+    })
 }
 
 /// The model with free constants at the `resolution` that the search began with, if it costs less: another discretisation shifts the resonances as a
@@ -268,7 +305,34 @@ fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored
         best = one;
         replaced = replacements(search, &best);
     }
+    if let Some(fewer) = fewer_for_all(search, &best)? {
+        best = fewer;
+        replaced = replacements(search, &best);
+    }
     Ok((best, replaced))
+}
+
+/// Those of the causes that take [`LEAST_TAKEN`] of what all take, where all of them still leave structure: the others stand for what the laws of these do not follow, as
+/// they do not lead to the noise either. None if all are needed.
+fn fewer_for_all(search: &mut Search, best: &Scored) -> Result<Option<Scored>, DiagnoseError> {
+    if search.causes(best) < 2 || search.above(best) <= VISIBLE {
+        return Ok(None);
+    }
+    (search.progress)("fewer causes, as all of them leave structure");
+    let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
+    let tuned = search.ranked_at_its_spread(&tuned)?;
+    let least = LEAST_TAKEN * (tuned.total() - best.total());
+    let mut fewer: Option<Scored> = None;
+    while let Some(from) = Some(fewer.as_ref().unwrap_or(best)).filter(|from| search.causes(from) > 1) {
+        let is_cause = |index: &usize| !search.candidate(&from.model().terms[*index]).is_constant;
+        let without = |index: usize| search.ranked_at_its_spread(&search.with_constants(&search.without(from, index).ok()?)).ok();
+        let shorter = (0..from.model().terms.len()).filter(is_cause).filter_map(without);
+        let shorter = shorter.min_by(|a, b| a.total().total_cmp(&b.total()));
+        let Some(shorter) = shorter.filter(|shorter| tuned.total() - shorter.total() >= least) else { break };
+        fewer = Some(shorter);
+    }
+    let settled = fewer.and_then(|fewer| search.settled_if(fewer, |_, _| true));
+    settled.map(|settled| search.backward(settled)).transpose()
 }
 
 /// True if a trial is to be preferred to the model `best`, in which it takes the place of the candidate `removed`.
@@ -331,6 +395,31 @@ mod tests {
             let one = one_for_all(&mut search, &best).unwrap_or(best);
             let candidates: Vec<usize> = one.model().terms.iter().map(|term| term.candidate).collect();
             assert_eq!(candidates, found, "{hidden}");
+        }
+    }
+
+    #[test]
+    fn small_causes_beside_a_large_one_are_left_out_only_where_structure_is_left_with_them() {
+        // What the cause `other` takes is 0.5 or 50 per value, beside 200; no candidate follows `late`.
+        for (other, late, found) in [(1.0, 1.0, vec![2]), (1.0, 0.0, vec![0, 2]), (10.0, 1.0, vec![0, 2])] {
+            let plant = Waves::new(&[("second", 20.0), ("other", other), ("late", late)]);
+            let mut search = search(&plant);
+            let terms = [0, 2].map(|candidate| Term { candidate, x: vec![1.0] });
+            let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
+            let fewer = fewer_for_all(&mut search, &best).unwrap().unwrap_or(best);
+            let candidates: Vec<usize> = fewer.model().terms.iter().map(|term| term.candidate).collect();
+            assert_eq!(candidates, found, "{other} {late}");
+        }
+    }
+
+    #[test]
+    fn faults_of_the_bench_count_that_leave_nothing_to_see_or_a_twentieth() {
+        for (late, before, explain) in [(0.5, 1.0, true), (1.0, 1.0, false), (1.0, 20.0, true)] {
+            // An amplitude of 1 leaves 0.5 per value.
+            let plant = Waves::new(&[("late", late)]);
+            let search = search(&plant);
+            let with = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+            assert_eq!(do_faults_explain(&search, &with, before), explain, "{late} of {before}");
         }
     }
 

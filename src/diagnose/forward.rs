@@ -31,11 +31,7 @@ impl Search<'_> {
             let (trials, screened) = self.trials(&best)?;
             let worthy = match self.top(&trials) {
                 Some(top) if self.is_worth(&top, &best) => Some(top),
-                // Another split first: with nuisance parameters of its own a cause that does a part of another one's work may be worth it, as a delay in the place of a lag.
-                top => self
-                    .seen_by_fit_runs(&mut best, &trials)
-                    .or_else(|| self.worth_once_settled(top?, &best))
-                    .or_else(|| self.both(&screened, &best)),
+                top => self.shown_otherwise(top, &mut best, &trials).or_else(|| self.both(&screened, &best)),
             };
             let settled = worthy.and_then(|worthy| {
                 (self.progress)(&self.adopting(&worthy, &best));
@@ -243,6 +239,30 @@ impl Search<'_> {
         self.fitted(both.model()).ok()
     }
 
+    /// A cause that is not worth it as it is, but on another split, or with nuisance parameters of its own. Where both are, the less costly one: on another split a law
+    /// that is not quite right may end far from where it suits all runs, and with nuisance parameters of its own a cause may do a part of another one's work, as a
+    /// delay in the place of a lag.
+    fn shown_otherwise(&mut self, top: Option<Scored>, base: &mut Scored, trials: &[Trial]) -> Option<Scored> {
+        let before = (self.split.clone(), self.estimator.state(), base.clone());
+        let Some(seen) = self.seen_by_fit_runs(base, trials) else { return self.worth_once_settled(top?, base) };
+        let Some(top) = top else { return Some(seen) };
+        let seen = self.settled_if(seen.clone(), |_, _| true).unwrap_or(seen);
+        let after = (self.split.clone(), self.estimator.state());
+        self.split = before.0;
+        self.estimator.restore(before.1);
+        match self.worth_once_settled(top, &before.2).filter(|settled| self.cost(settled) < self.cost(&seen)) {
+            Some(settled) => {
+                *base = before.2;
+                Some(settled)
+            }
+            None => {
+                self.split = after.0;
+                self.estimator.restore(after.1);
+                Some(seen)
+            }
+        }
+    }
+
     /// A trial that takes much, but leaves so much that this may be chance, with nuisance parameters of its own: those of the model without a slew rate are far from those
     /// with it.
     fn worth_once_settled(&mut self, trial: Scored, base: &Scored) -> Option<Scored> {
@@ -371,6 +391,26 @@ mod tests {
         assert_eq!(first[0].candidate, 1);
         assert_eq!(best.model().terms.iter().map(|term| term.candidate).collect::<Vec<_>>(), [0]);
         assert!(search.estimator.shares().amax() < 0.1, "{}", search.estimator.shares());
+    }
+
+    #[test]
+    fn of_a_cause_on_another_split_and_one_with_nuisance_parameters_of_its_own_the_less_costly_one_is_adopted() {
+        for (other, adopted) in [(3.0, 0), (1.0, 1)] {
+            let mut plant = Waves::new(&[("other", other), ("late", 12.0)]);
+            plant.lateness = 4.0;
+            plant.candidates = ["other", "late"].map(candidate).to_vec();
+            let mut search = search(&plant);
+            let mut base = search.calibrated(1.0).unwrap();
+            let trial = |candidate: usize| {
+                let model = Model::new(vec![Term { candidate, x: vec![1.0] }], 1.0, false);
+                Trial { candidate, scored: search.fitted(&model).unwrap() }
+            };
+            let (trials, own) = ([trial(1), trial(0)], search.split.select.clone());
+            let found = search.shown_otherwise(Some(trials[1].scored.clone()), &mut base, &trials).unwrap();
+            assert_eq!(found.model().terms[0].candidate, adopted, "{other}");
+            // The split is that of the one that is adopted.
+            assert_eq!(search.split.select == own, adopted == 0);
+        }
     }
 
     #[test]

@@ -1104,11 +1104,11 @@ fn first_of_each<'m, K: PartialEq>(
 
 /// Least squares of −`rest` on the columns of starts: the fall of χ², and the weights; none without columns.
 fn least_squares(columns: &[&(Term, DVector<f64>)], rest: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
-    let n = columns.len();
+    let n = Some(columns.len()).filter(|n| *n > 0)?;
     let mut information = DMatrix::from_fn(n, n, |i, j| columns[i].1.dot(&columns[j].1));
     (0..n).for_each(|k| information[(k, k)] *= 1.0 + LEAST_RIDGE);
     let right = DVector::from_fn(n, |k, _| -columns[k].1.dot(rest));
-    let weights = information.lu().solve(&right).filter(|_| n > 0)?;
+    let weights = information.lu().solve(&right)?;
     Some((right.dot(&weights), weights))
 }
 
@@ -1156,6 +1156,16 @@ mod tests {
         let plain = search.calibrated(1.0).unwrap();
         let (best, _) = search.forward(plain).unwrap();
         best.model().terms.iter().map(|term| search.id(term.candidate)).collect()
+    }
+
+    #[test]
+    fn a_model_with_all_constants_gets_no_more_of_them() {
+        let mut plant = Waves::new(&[("other", 3.0)]);
+        plant.candidates[0].is_constant = true;
+        let search = search(&plant);
+        let all = search.fitted(&search.with_constants(&Model::new(Vec::new(), 1.0, false))).unwrap();
+        let same = search.with_significant_constants(all.clone()).unwrap();
+        assert_eq!(same.model().terms.len(), all.model().terms.len());
     }
 
     #[test]

@@ -115,9 +115,13 @@ pub(super) fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize
         if switches.is_empty() || !switches.iter().all(holds) {
             continue;
         }
-        let without = search.without(best, index)?;
+        let without = search.fitted(&search.without(best, index)?)?;
+        // What is left cannot stand for a cause that takes more than that.
+        if judged.is_unexplained && search.above(&without) > 2.0 * search.above(best) {
+            continue;
+        }
         let inflation = own.map(|k| intervals.inflation[k]).fold(1.0, f64::max);
-        let gain = (search.fitted(&without)?.fitted - best.fitted) / inflation;
+        let gain = (without.fitted - best.fitted) / inflation;
         let needed = CHI2_95[(term.x.len() - 1).min(CHI2_95.len() - 1)];
         if switches.len() > 1 && gain > needed {
             continue;
