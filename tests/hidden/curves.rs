@@ -35,7 +35,7 @@ pub fn threshold_growth(slope: f64, _: f64) -> Operator {
     curve(move |v| v * (1.0 + 1e-3 * slope * (v.abs() - 350.0).max(0.0)))
 }
 
-/// The charge constant grows as domains nucleate, with `exp(-600 V / |V|)` of the size: Merz, Phys. Rev. 95 (1954) 690.
+/// The charge constant grows as domains nucleate, with `exp(-600 V / |V|)` of the size, the law of their rate: Merz, Phys. Rev. 95 (1954) 690.
 pub fn nucleated_growth(share: f64, _: f64) -> Operator {
     curve(move |v| v * (1.0 + share * (-600.0 / v.abs()).exp()))
 }
@@ -63,8 +63,8 @@ pub fn dead_zone(volts: f64, _: f64) -> Operator {
     curve(move |v| if v > 0.0 { passed(v) } else { v })
 }
 
-/// Positive voltages turn domains back, each at its own voltage about 230 V (Hwang, Lynch and McMeeking, Acta Metall. Mater. 43 (1995) 2073). The size is
-/// the stroke of all of them in V.
+/// Positive voltages turn domains back, each at its own voltage about 230 V, as grains of unlike directions switch one by one (Hwang, Lynch and
+/// McMeeking, 1995); the logistic course is assumed. The size is the stroke of all of them in V.
 pub fn turned_domains(stroke: f64, _: f64) -> Operator {
     let turned = |v: f64| 1.0 / (1.0 + (-(v - 230.0) / 40.0).exp());
     curve(move |v| if v > 0.0 { v + stroke * (turned(v) - turned(0.0)) } else { v })

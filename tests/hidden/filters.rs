@@ -133,8 +133,8 @@ pub fn peak_current(limit: f64, first: f64) -> Operator {
     })
 }
 
-/// A converter that charges by pulses of the same energy (flyback chargers of capacitors, as the LT3750): the rate is inversely proportional to the voltage and
-/// at most three times the size, which is the rate at 750 V and that of a sink of constant current, V/s.
+/// A flyback converter that charges by pulses of the same energy, of which as many are assumed to come at any voltage: the rate is inversely proportional to the
+/// voltage and at most three times the size, which is the rate at 750 V and that of a sink of constant current, V/s.
 pub fn equal_pulses(limit: f64, first: f64) -> Operator {
     let mut now = first;
     Box::new(move |v, dt| {

@@ -64,8 +64,8 @@ pub fn activated_creep(share: f64, first: f64) -> Operator {
     })
 }
 
-/// The amount of creep grows with the square of the field, as domains switch more readily towards the coercive one: Zhou and Kamlah, Acta Mater. 54
-/// (2006) 1389. The size is the share of each element at 1000 V.
+/// The amount of creep grows with the square of the field, which is assumed, as domains switch more readily towards the coercive one (creep of soft PZT:
+/// Zhou and Kamlah, 2006). The size is the share of each element at 1000 V.
 pub fn quadratic_creep(share: f64, first: f64) -> Operator {
     let amount = |v: f64| v * v.abs() / 1000.0;
     let mut slow = branches(amount(first), [0.2, 1.0, 5.0].map(|time| [time, share]).to_vec());
@@ -172,7 +172,8 @@ pub fn rayleigh(share: f64, first: f64) -> Operator {
 }
 
 /// Every branch is the same cubic between the point where it turned and the one before, or the mirror image of a first turn, so that loops of all widths are
-/// alike: Bashash and Jalili, J. Dyn. Syst. Meas. Control 130 (2008) 031008. The size is half the gain that is lost at a turn.
+/// alike, after the linear mapping of polynomials by Bashash and Jalili (2008); that they are cubic is assumed. The size is half the gain that is lost at a
+/// turn.
 pub fn mapped_branches(share: f64, first: f64) -> Operator {
     let mut turns = vec![[first, first]];
     let mut now = [first, first];

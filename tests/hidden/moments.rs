@@ -59,7 +59,8 @@ pub enum Moment {
     /// Stiffness falls between two plateaus as that of a filled polymer, here the bond: Kraus, J. Appl. Polym. Sci. Appl. Polym. Symp. 39 (1984) 75; the
     /// share lost.
     SofteningByKraus(f64),
-    /// Ceramics soften under tension long before they do under compression: Fett, Mueller, Munz and Thun, J. Mater. Sci. Lett. 17 (1998) 261; the share lost.
+    /// Ceramics soften under tension long before they do under compression (unlike deformation of PZT under either: Fett, Mueller, Munz and Thun, 1998), by an
+    /// assumed course; the share lost.
     SofteningByTension(f64),
     /// Friction with a static excess: Stribeck's curve, regularised by a root (Armstrong-Helouvry, 1991). Moments in dyn cm from here.
     Stribeck(f64),
@@ -79,8 +80,8 @@ pub enum Moment {
     BroadPeak(f64),
     /// A loss in proportion to the angle and against the motion: Reid, J. R. Aeronaut. Soc. 60 (1956) 283; share of the stiffness.
     Reid(f64),
-    /// A damper in inverse proportion to the frequency of the motion at the time, which is that of its recent mean squares: the hysteretic damping of Bishop,
-    /// J. R. Aeronaut. Soc. 59 (1955) 738; share of the stiffness.
+    /// A damper in inverse proportion to the frequency of the motion: hysteretic damping (Bishop, The treatment of damping forces in vibration theory, 1955). The
+    /// frequency at the time is assumed to be that of the recent mean squares; share of the stiffness.
     HystereticDamper(f64),
     /// The clamp has a damper; its time in s.
     ClampDamper(f64),
@@ -327,8 +328,8 @@ pub enum Air {
     Mixed(f64),
     /// A coefficient that falls with the Reynolds number as `(1 + const / sqrt(Re))^2`: Abraham, Phys. Fluids 13 (1970) 2194.
     Reynolds(f64),
-    /// Loose ends (leads, tape, markers) bend away from the flow, so that their drag passes from the square of the speed to the speed itself: Gosselin, de Langre
-    /// and Machado-Almeida, J. Fluid Mech. 650 (2010) 319.
+    /// Loose ends (leads, tape, markers) bend away from the flow, so that their drag passes from the square of the speed to a lower power, here the speed itself;
+    /// flexible plates come to powers of 4/3 and, if round, 2/3: Gosselin, de Langre and Machado-Almeida, J. Fluid Mech. 650 (2010) 319.
     Bending(f64),
 }
 
