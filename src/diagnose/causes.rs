@@ -312,13 +312,13 @@ fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored
     Ok((best, replaced))
 }
 
-/// Those of the causes that take [`LEAST_TAKEN`] of what all take, where all of them still leave structure: the others stand for what the laws of these do not follow, as
-/// they do not lead to the noise either. None if all are needed.
+/// Those of the causes that take [`LEAST_TAKEN`] of what all take, where all of them still leave so much that the verdict would be unexplained: the others stand for what the
+/// laws of these do not follow. None if all are needed.
 fn fewer_for_all(search: &mut Search, best: &Scored) -> Result<Option<Scored>, DiagnoseError> {
-    if search.causes(best) < 2 || search.above(best) <= VISIBLE {
+    if search.causes(best) < 2 || search.above(best) <= VISIBLE || search.share_left(best) <= LEFT_SHARE {
         return Ok(None);
     }
-    (search.progress)("fewer causes, as all of them leave structure");
+    (search.progress)("fewer causes, as all of them leave much");
     let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
     let tuned = search.ranked_at_its_spread(&tuned)?;
     let least = LEAST_TAKEN * (tuned.total() - best.total());
