@@ -418,6 +418,26 @@ mod tests {
     }
 
     #[test]
+    fn a_cause_that_takes_more_than_is_left_is_not_dropped_for_its_range() {
+        // One takes 18 per value, with 12.5 left; beside another one the second takes 6, with 8 left.
+        for (waves, adopted, kept) in [
+            (vec![("first", 6.0), ("other", 5.0)], vec![1], true),
+            (vec![("first", 6.0), ("other", 3.5), ("late", 4.0)], vec![1, 0], false),
+        ] {
+            let plant = Waves::new(&waves);
+            let search = search(&plant);
+            let bare = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+            let terms = adopted.iter().map(|candidate| Term { candidate: *candidate, x: vec![1.0] });
+            let best = search.fitted(&Model::new(terms.collect(), 1.0, false)).unwrap();
+            let mut judged = judge(&search, best, &bare, f64::INFINITY, 1.0).unwrap();
+            // As wide as what is left can make a range.
+            judged.intervals.ends.fill([-1.0, 10.0]);
+            assert!(judged.is_unexplained);
+            assert_eq!(doubtful(&search, &judged).unwrap().is_none(), kept, "{waves:?}");
+        }
+    }
+
+    #[test]
     fn a_constant_within_the_discretisation_s_error_is_minor() {
         let minor = |tolerance: f64| {
             let mut plant = Waves::new(&[("other", 3.0)]);
