@@ -1,6 +1,7 @@
 //! The causes of a misfit: selected without and with faults of the bench, named at their places, and refitted.
 
 use super::DiagnoseError;
+use super::budget::Phase;
 use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
 use super::naming::{self, LEAST_TAKEN, Naming};
@@ -54,6 +55,7 @@ pub(super) struct Causes {
 /// [`DiagnoseError`] if a model cannot be simulated.
 pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
+    let is_by_names = search.phase == Phase::ByNames;
     search.estimator.is_calibrated = true;
     let without = search.estimator.given_spread();
     let has_faults = calibrated.model().spread != without;
@@ -87,6 +89,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             let cost = plain.as_ref().map_or(f64::INFINITY, |plain| search.cost(&plain.best));
             let above = plain.as_ref().map_or(f64::INFINITY, |plain| search.above(&plain.best));
             let after = (search.estimator.state(), search.split.clone());
+            search.phase = if is_by_names { Phase::ByNames } else { Phase::WithFaults };
             search.estimator.restore(before.0.clone());
             search.estimator.held_spread = None;
             search.split = before.1.clone();
@@ -106,6 +109,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             }
         }
     };
+    search.phase = if is_by_names { Phase::ByNames } else { Phase::Naming };
     // What a name leaves, and what a cause takes, is no fault of the bench.
     search.estimator.held_spread = Some(causes.best.model().spread);
     name_causes(search, &mut causes, calibrated.model().resolution)?;
@@ -119,7 +123,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
         (search.progress)("causes by names only");
         search.estimator.restore(before.0);
         search.split = before.1;
-        search.is_by_names = true;
+        search.phase = Phase::ByNames;
         return find(search, calibrated, is_insufficient);
     }
     Ok(causes)
@@ -150,14 +154,10 @@ fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Res
         return Ok(());
     }
     causes.open = search.above(&causes.best);
-    let before = causes.best.model().clone();
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
     causes.nearest = nearest;
-    causes.best = search.backward(best)?;
-    let ids = |model: &Model| -> Vec<usize> { model.terms.iter().map(|term| term.candidate).collect() };
-    if ids(causes.best.model()) != ids(&before) {
-        (causes.best, causes.replaced) = replace(search, causes.best.clone(), resolution)?;
-    }
+    let best = search.backward(best)?;
+    (causes.best, causes.replaced) = replace(search, best, resolution)?;
     causes.coarse_total = causes.best.total();
     Ok(())
 }
@@ -206,8 +206,12 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         }
     }
 
-    let (mut best, replaced) =
-        if is_insufficient { (best, Vec::new()) } else { replace(search, best, calibrated.model().resolution)? };
+    // Causes are replaced once free forms have got their names, for which others are tried then anyway.
+    let (mut best, replaced) = if is_insufficient || has_free_forms(search, &best) {
+        (best, Vec::new())
+    } else {
+        replace(search, best, calibrated.model().resolution)?
+    };
     if faults_come_last {
         search.estimator.held_spread = None;
     }
@@ -245,7 +249,7 @@ fn constants_for_discretisation(search: &Search, best: Scored, resolution: f64) 
 /// One cause in the place of all causes and constants of a model, in its own discretisation and with the law that suits it, if that costs less: several causes
 /// and a discretisation may stand together for one that was not the best one at first.
 fn one_for_all(search: &mut Search, best: &Scored) -> Option<Scored> {
-    if best.model().terms.len() < 2 {
+    if best.model().terms.len() < 2 || !search.may_go_on() {
         return None;
     }
     (search.progress)("one cause in the place of all");
@@ -263,8 +267,11 @@ fn one_for_all(search: &mut Search, best: &Scored) -> Option<Scored> {
             ones.extend(start.map(|start| Model { terms: vec![start], ..bare.model().clone() }));
         }
     }
-    let one = |model: &Model| {
-        let scored = search.ranked_beyond(model, &screened).ok()?;
+    // Only the nearest ones in the discretisation that suits them.
+    let mut nearest: Vec<Scored> = ones.iter().filter_map(|model| search.ranked_beyond(model, &screened).ok()).collect();
+    nearest.sort_by(|a, b| a.total().total_cmp(&b.total()));
+    nearest.truncate(REPLACEMENTS);
+    let one = |scored: Scored| {
         let plain = search.resolve(scored, Convergence::Rank);
         if bare.total() - plain.total() < own {
             return None;
@@ -274,7 +281,7 @@ fn one_for_all(search: &mut Search, best: &Scored) -> Option<Scored> {
         // Another law in the discretisation that suits it.
         Some(if other.model().terms[0].candidate == candidate { other } else { search.resolve(other, Convergence::Rank) })
     };
-    let least = ones.iter().filter_map(one).min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)));
+    let least = nearest.into_iter().filter_map(one).min_by(|a, b| search.cost(a).total_cmp(&search.cost(b)));
     let least = least.filter(|least| search.cost(least) < search.cost(best))?;
     search.settled_if(least, |_, _| true)
 }
@@ -284,7 +291,8 @@ fn one_for_all(search: &mut Search, best: &Scored) -> Option<Scored> {
 fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored, Vec<(usize, Trial)>), DiagnoseError> {
     // A model at the edge of what can be simulated has no derivatives to compare others by.
     let replacements = |search: &Search, best: &Scored| {
-        if best.model().terms.is_empty() { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
+        let has_none = best.model().terms.is_empty() || !search.may_go_on();
+        if has_none { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
     };
     let mut best = constants_for_discretisation(search, best, resolution);
     let mut replaced = replacements(search, &best);
@@ -376,9 +384,9 @@ mod tests {
     fn names_only_leave_free_forms_out() {
         let mut plant = Waves::new(&[("other", 1.0)]);
         plant.candidates[0].is_free_form = true;
-        for (is_by_names, count) in [(false, 1), (true, 0)] {
+        for (phase, count) in [(Phase::Plain, 1), (Phase::ByNames, 0)] {
             let mut search = search(&plant);
-            search.is_by_names = is_by_names;
+            search.phase = phase;
             let calibrated = search.calibrated(1.0).unwrap();
             assert_eq!(search.forward(calibrated).unwrap().0.model().terms.len(), count);
         }

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::bench::{self, Columns, Spread};
 use super::blocks::blocks;
+use super::budget::Budget;
 use super::kept::Kept;
 use super::noise::Noise;
 use super::plant::{Model, Nuisance, Plant, Term};
@@ -137,6 +138,8 @@ pub struct Estimator<'a> {
     /// The noise that residuals are whitened for.
     pub noise: Noise,
     kept: Kept,
+    /// What predictions have cost.
+    pub(super) budget: Budget,
 }
 
 /// What an [`Estimator`] has found out of the data beside the model.
@@ -178,7 +181,12 @@ impl<'a> Estimator<'a> {
             faults: Vec::new(),
             noise: Noise::default(),
             kept: Kept::default(),
+            budget: Budget::new(plant),
         }
+    }
+
+    fn spend(&self, model: &Model, runs: &[usize], times: usize) {
+        runs.iter().for_each(|run| self.budget.spend(self.plant, model, *run, times));
     }
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Arc<Vec<f64>>, DiagnoseError> {
@@ -230,6 +238,7 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn costs_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<(Residuals, f64)>, DiagnoseError> {
+        self.spend(model, runs, 1);
         let of = |run: &usize| {
             let mut residuals = self.misfit(model, *run, &self.nuisance(model, *run))?;
             let cost = self.eliminate(model, *run, &mut residuals);
@@ -264,6 +273,7 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn residuals_of(&self, model: &Model, runs: &[usize]) -> Result<Vec<Residuals>, DiagnoseError> {
+        self.spend(model, runs, 1);
         runs.par_iter().map(|run| self.residuals(model, *run)).collect()
     }
 
@@ -304,6 +314,7 @@ impl<'a> Estimator<'a> {
         known: &[Vec<Residuals>],
     ) -> Result<(Vec<Residuals>, Derivatives), DiagnoseError> {
         let coordinates = &coordinates(model)[known.len()..];
+        self.spend(model, runs, 1 + coordinates.len());
         let tasks: Vec<(usize, usize)> =
             (0..=coordinates.len()).flat_map(|column| runs.iter().map(move |run| (column, *run))).collect();
         // Residuals after a step, and the step: backward or shorter where a model cannot be simulated, as at the edge of a robot's equilibria.
@@ -650,6 +661,7 @@ impl<'a> Estimator<'a> {
     /// # Errors
     /// [`DiagnoseError`] if the model cannot be simulated.
     pub fn fit_nuisances(&mut self, model: &Model, runs: &[usize]) -> Result<(), DiagnoseError> {
+        runs.iter().for_each(|run| self.spend(model, &[*run], 2 * (1 + self.nuisances[*run].shares.len())));
         let fitted: Vec<Vec<f64>> = runs.par_iter().map(|run| self.fitted_shares(model, *run)).collect::<Result<_, _>>()?;
         for (run, shares) in runs.iter().zip(fitted) {
             self.nuisances[*run].shares = shares;

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::DiagnoseError;
+use super::budget::Phase;
 use super::fit::{Convergence, sum_of_squares};
 use super::naming::is_of;
 use super::search::{LEAST_BIC, Scored, Screened, Search, Trial, VISIBLE};
@@ -25,7 +26,7 @@ impl Search<'_> {
         let mut best = from;
         let mut first: Option<Vec<Trial>> = None;
         for _ in 0..MOST_CAUSES {
-            if !self.is_sought(&best) {
+            if !(self.is_sought(&best) && self.may_go_on()) {
                 break;
             }
             let (trials, screened) = self.trials(&best)?;
@@ -173,8 +174,8 @@ impl Search<'_> {
     fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
         // Other laws of a cause are tried once it is adopted.
-        let screened =
-            self.screen_of(from, |candidate| !(candidate.is_variant || (candidate.is_free_form && self.is_by_names)))?;
+        let screened = self
+            .screen_of(from, |candidate| !(candidate.is_variant || (candidate.is_free_form && self.phase == Phase::ByNames)))?;
         let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
         let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
         let most_free = free.first().map_or(0.0, |(gain, _)| *gain);

@@ -16,6 +16,7 @@ mod adopted;
 pub mod answer;
 pub mod bench;
 mod blocks;
+mod budget;
 mod candidates;
 mod causes;
 pub mod combinations;

@@ -167,6 +167,9 @@ impl<'a> Place<'a> {
     /// A single name of another place that is as good as the free form. Near a resonance, memories of the joints, of the voltage and of the driver do nearly the
     /// same, and each has a free form.
     fn elsewhere(&self) -> Option<Attempt> {
+        if !self.search.may_go_on() {
+            return None;
+        }
         let tried = self.promising(|candidate| !(candidate.is_free_form || self.is_name(candidate)), 0).ok()?;
         self.simplest(tried).filter(|attempt| self.is_as_good(attempt, &self.best))
     }
@@ -182,9 +185,12 @@ impl<'a> Place<'a> {
         Ok(models.iter().filter_map(|model| self.attempt(&start(model)?)).collect())
     }
 
-    /// Two or three names that are as good as the free form, none if none are: beside the best single ones of `tried`, then those that would take most
+    /// Two or three names that are as good as the free form, none if none are, or if much is left with the free form, which they could follow: beside the best single ones of `tried`, then those that would take most
     /// together. They may be of other places, as what a free form takes need not be of its place alone. Models that cannot be simulated are none.
     fn several(&self, tried: &[Attempt]) -> Option<Attempt> {
+        if self.search.is_sought(&self.best) || !self.search.may_go_on() {
+            return None;
+        }
         let mut firsts: Vec<&Attempt> = Vec::new();
         for attempt in tried {
             if firsts.len() < MOST_FIRST && firsts.iter().all(|other| other.name != attempt.name) {

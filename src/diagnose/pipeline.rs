@@ -5,12 +5,13 @@
 
 use super::DiagnoseError;
 use super::adopted::{Adoption, adopted, estimates};
+use super::budget::first_resolution;
 use super::causes::{Causes, find};
 use super::combinations::combinations;
 use super::dataset::Role;
 use super::diagnosis::{Adopted, Diagnosis, Estimate, Part, Ranked, RunError, Stage, Verdict};
 use super::faults;
-use super::fit::{Estimator, Residuals};
+use super::fit::Residuals;
 use super::intervals::{Intervals, intervals_of};
 use super::names;
 use super::plant::{Model, Plant, Signal};
@@ -24,10 +25,11 @@ use super::unseen::Unseen;
 use super::verdict::{Judged, LEFT_OVER, doubtful, insufficient_data, judge};
 use crate::number::significant;
 
-/// Discretisation of the search, or the next finer one of the plant; re-tuned constants absorb the change with finer ones.
-const SEARCH_RESOLUTION: f64 = 10.0;
 /// The next experiment where the data are insufficient.
 const MORE_RUNS: &str = "measure three runs or more under inputs of different size and speed, with a hundred rows each or more";
+
+/// Said where the search ended before it had tried all.
+const CUT_SHORT: &str = "the search was ended after as many simulations as it may take: further causes, and names in the place of these, were not all tried";
 
 /// The diagnosis with its models, for figures and for the extended experiment.
 pub struct Outcome {
@@ -83,6 +85,9 @@ pub fn diagnose(
     if spikes > 0 {
         remarks.insert(0, format!("{spikes} single values far off their neighbours' residuals were left out"));
     }
+    if search.estimator.budget.is_cut() {
+        remarks.push(CUT_SHORT.to_owned());
+    }
     remarks.extend(judged.remark.clone());
     remarks.extend(insufficient.clone().filter(|insufficient| !remarks.contains(insufficient)));
     let report = Report {
@@ -136,12 +141,9 @@ struct Prepared<'a> {
 
 /// Re-tunes the constants, and measures the noise of what they leave.
 fn prepare<'a>(plant: &'a dyn Plant, roles: &[Role], progress: &'a (dyn Fn(&str) + Sync)) -> Result<Prepared<'a>, DiagnoseError> {
-    let resolutions = plant.resolutions();
-    let nominal_resolution = resolutions.first().copied().unwrap_or(1.0);
-    let start = resolutions.iter().copied().find(|r| *r >= SEARCH_RESOLUTION).unwrap_or(nominal_resolution);
-    let estimator = Estimator::new(plant);
-    let mut search =
-        Search { estimator, split: split(plant, roles), progress, unexplained: 0.0, limit: f64::INFINITY, is_by_names: false };
+    let nominal_resolution = plant.resolutions().first().copied().unwrap_or(1.0);
+    let start = first_resolution(plant);
+    let mut search = Search::new(plant, split(plant, roles), progress);
     progress("the nominal model");
     let nominal = search.fitted(&Model::new(Vec::new(), nominal_resolution, true))?;
     progress("constants of the nominal model");
@@ -258,11 +260,12 @@ impl Report<'_, '_> {
             runs: search.split.all().len(),
         };
         let is_open = *is_unexplained || has_rest;
+        let is_cut = search.estimator.budget.is_cut();
         Ok(Diagnosis {
             schema: 2,
             dataset: String::new(),
             verdict,
-            complete: verdict != Verdict::Unexplained && failed.is_none() && unseen.is_none() && !has_rest,
+            complete: verdict != Verdict::Unexplained && failed.is_none() && unseen.is_none() && !(has_rest || is_cut),
             summary: summary(verdict, &findings),
             // Where no structure is left, the share of a small misfit is meaningless: it is limited to the share of the noise.
             unexplained_fraction: if is_open { *unexplained_fraction } else { unexplained_fraction.min(left.min(1.0)) },

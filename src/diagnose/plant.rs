@@ -166,6 +166,11 @@ pub trait Plant: Sync {
         0
     }
 
+    /// What a prediction of a run by `model` costs, in any unit.
+    fn work(&self, _model: &Model, _run: usize) -> u64 {
+        1
+    }
+
     /// True for a run that moves under a constant input, as one that is released from another shape than its equilibrium.
     fn moves_unaided(&self, _run: usize) -> bool {
         false

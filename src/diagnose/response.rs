@@ -15,6 +15,19 @@ const STEADY: f64 = 7.0;
 /// Longest wait (s).
 const LONGEST: f64 = 20.0;
 
+/// Periods from the beginning of the sampled one to the end of the run.
+const BEYOND: f64 = 1.5;
+
+/// 2/(η ω²), the time (s) in which the first mode of a robot, at `first` (Hz), decays.
+fn decay(robot: &Robot, first: f64) -> f64 {
+    2.0 / (robot.damping.time() * (TAU * first).powi(2)).max(1e-9)
+}
+
+/// Beginning of the sampled period (s), a whole number of periods of a sine at `frequency` (Hz), for a time of decay (s).
+fn from(decay: f64, frequency: f64) -> f64 {
+    ((STEADY * decay).min(LONGEST) * frequency).ceil().max(2.0) / frequency
+}
+
 /// A sine and the times at which its response is sampled.
 pub(super) struct Sine {
     frequency: f64,
@@ -27,9 +40,8 @@ pub(super) struct Sine {
 impl Sine {
     /// A sine of a response at a frequency (Hz) for a robot whose first mode is at `first` (Hz); `applied` is the voltage (V) of a commanded one.
     pub fn new(response: &Response, frequency: f64, robot: &Robot, first: f64, applied: impl Fn(f64) -> f64) -> Self {
-        // 2/(η ω²), the time in which the first mode decays.
-        let decay = 2.0 / (robot.damping.time() * (TAU * first).powi(2)).max(1e-9);
-        let from = ((STEADY * decay).min(LONGEST) * frequency).ceil().max(2.0) / frequency;
+        let decay = decay(robot, first);
+        let from = from(decay, frequency);
         let rise = (RISE * decay).min(0.5 * from);
         let count = ((from * frequency).round() as usize + 2) * SAMPLES;
         let times: Vec<f64> = (0..=count).map(|k| k as f64 / (SAMPLES as f64 * frequency)).collect();
@@ -48,7 +60,12 @@ impl Sine {
 
     /// Length of the run (s).
     pub fn duration(&self) -> f64 {
-        self.from + 1.5 / self.frequency
+        self.from + BEYOND / self.frequency
+    }
+
+    /// [`duration`](Self::duration) of a sine that need not be made for it.
+    pub fn duration_of(frequency: f64, robot: &Robot, first: f64) -> f64 {
+        from(decay(robot, first), frequency) + BEYOND / frequency
     }
 
     /// Times (s) of the samples of a period that begins later by `delay` (s).

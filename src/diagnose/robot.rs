@@ -29,6 +29,8 @@ const STEPS_PER_PERIOD: f64 = 220.0;
 const GROUND_STEP: f64 = 1e-4;
 /// Kinds of effects that do nothing at 0 V.
 const ON_VOLTAGES: [Kind; 2] = [Kind::Driver, Kind::Actuation];
+/// Causes with which steps are repeated until friction agrees with its law.
+const WITH_REPEATED_STEPS: [&str; 2] = ["dry-friction", "free-joint-friction"];
 /// Time steps in a period of a frequency response.
 const ROWS_PER_PERIOD: f64 = 40.0;
 /// Nodes and weights of Gauss's rule for the mean over an interval of length 1 about 0: exact for a motion of fifth degree in time.
@@ -326,6 +328,11 @@ impl RobotPlant {
     }
 }
 
+/// Frequency of the first mode of a clamped robot (Hz).
+fn first_frequency(robot: &Robot) -> f64 {
+    analytic::cantilever_frequency(robot) / (robot.actuators as f64).powi(2)
+}
+
 /// A time step (s) that divides the median interval of the rows at `times` (s).
 pub(super) fn step(robot: &Robot, times: &[f64]) -> f64 {
     let longest = match robot.mount {
@@ -362,6 +369,26 @@ impl Plant for RobotPlant {
 
     fn nuisances(&self, run: usize) -> usize {
         self.runs[run].command.jumps().len()
+    }
+
+    /// Time steps, times joints and what a step costs without any (in joints), times repetitions of a step.
+    fn work(&self, model: &Model, run: usize) -> u64 {
+        const OF_STEP: f64 = 16.0;
+        const REPETITIONS: f64 = 2.5;
+        let Run { robot, response, step, .. } = &self.runs[run];
+        let steps = match response {
+            Some(response) => {
+                let first = first_frequency(robot);
+                let durations = response.frequencies.iter().map(|frequency| Sine::duration_of(*frequency, robot, first));
+                (durations.sum::<f64>() / step).ceil() as u64
+            }
+            None => self.steps_of(run, *step),
+        };
+        let has_friction = model.terms.iter().any(|term| WITH_REPEATED_STEPS.contains(&self.candidates[term.candidate].id));
+        let of_step = OF_STEP + robot.actuators as f64 * model.resolution;
+        // Half the time step in the final refit.
+        let factor = if has_friction { REPETITIONS } else { 1.0 } * if model.fine { 2.0 } else { 1.0 };
+        (steps as f64 * of_step * factor) as u64
     }
 
     fn moves_unaided(&self, run: usize) -> bool {
@@ -532,7 +559,7 @@ impl RobotPlant {
         nuisance: &Nuisance,
         step: f64,
     ) -> Result<Vec<f64>, DiagnoseError> {
-        let first = analytic::cantilever_frequency(&run.robot) / (run.robot.actuators as f64).powi(2);
+        let first = first_frequency(&run.robot);
         let marker = &run.markers[response.channel / 2..][..1];
         let of = |frequency: &f64| -> Result<[f64; 2], DiagnoseError> {
             let applied = |v: f64| (1.0 + nuisance.base[Spread::GAIN]) * if v > 0.0 { run.positive_gain * v } else { v };

@@ -12,10 +12,11 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::blocks::blocks;
+use super::budget::Phase;
 use super::fit::{Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::naming::LEAST_TAKEN;
 use super::noise;
-use super::plant::{Candidate, Free, Model, Term};
+use super::plant::{Candidate, Free, Model, Plant, Term};
 use super::projection::{tangents, without_directions};
 use super::split::Split;
 use super::subset::Subset;
@@ -120,8 +121,8 @@ pub struct Search<'a> {
     pub unexplained: f64,
     /// Models with two causes that cost more are given up; infinite for none.
     pub limit: f64,
-    /// True if no free form is a candidate.
-    pub is_by_names: bool,
+    /// The phase that is under way; no free form is a candidate in that by names only.
+    pub(super) phase: Phase,
     /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
@@ -194,7 +195,20 @@ impl Responses {
     }
 }
 
+impl<'a> Search<'a> {
+    /// A search that has not begun yet.
+    pub fn new(plant: &'a dyn Plant, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Self {
+        let estimator = Estimator::new(plant);
+        Self { estimator, split, progress, unexplained: 0.0, limit: f64::INFINITY, phase: Phase::Plain }
+    }
+}
+
 impl Search<'_> {
+    /// True if something new may be begun; otherwise the search is cut short.
+    pub(super) fn may_go_on(&self) -> bool {
+        self.estimator.budget.allows(self.phase)
+    }
+
     /// The candidate's name.
     pub fn id(&self, candidate: usize) -> &'static str {
         self.estimator.plant.candidates()[candidate].id
@@ -958,6 +972,9 @@ impl Search<'_> {
         (self.progress)("screening all candidates beside the causes");
         let responses = self.responses(best.model(), |_, candidate| !(candidate.is_free_form || candidate.is_variant))?;
         for (index, removed) in best.model().terms.iter().enumerate() {
+            if !self.may_go_on() {
+                break;
+            }
             (self.progress)(&format!("trying others in the place of {}", self.id(removed.candidate)));
             // On the same bench: faults could stand in for the cause.
             let without = self.without(best, index).and_then(|model| self.ranked_at_its_spread(&model));

@@ -93,7 +93,6 @@ impl Roughness {
 mod tests {
     use super::*;
     use crate::diagnose::DiagnoseError;
-    use crate::diagnose::fit::Estimator;
     use crate::diagnose::plant::{Candidate, Free, FreeCurve, Model, Nuisance, Plant, Signal};
     use crate::diagnose::split::Split;
 
@@ -183,14 +182,7 @@ mod tests {
     fn errors(law: &dyn Fn(f64) -> f64, sigma: f64) -> [f64; 2] {
         let plant = Curve::new(law, sigma);
         let split = Split { fit: vec![0, 1], select: vec![2, 3], judge: vec![] };
-        let search = Search {
-            estimator: Estimator::new(&plant),
-            split,
-            unexplained: 0.0,
-            limit: f64::INFINITY,
-            is_by_names: false,
-            progress: &|_: &str| {},
-        };
+        let search = Search::new(&plant, split, &|_: &str| {});
         let fitted = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![0.1; WEIGHTS] }], 1.0, false)).unwrap();
         let error = |scored: &Scored| {
             let off = |(k, x): (usize, &f64)| (x - law((k + 1) as f64)).powi(2);

@@ -97,7 +97,6 @@ impl Unseen {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::fit::Estimator;
     use crate::diagnose::plant::{Candidate, Free, Nuisance, Plant, Signal, Term};
     use crate::diagnose::search::Search;
     use crate::diagnose::split::Split;
@@ -161,7 +160,7 @@ mod tests {
     }
 
     fn search<'a>(plant: &'a Means, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Search<'a> {
-        Search { estimator: Estimator::new(plant), split, progress, unexplained: 0.0, limit: f64::INFINITY, is_by_names: false }
+        Search::new(plant, split, progress)
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use super::DiagnoseError;
 use super::dataset::Role;
-use super::fit::Estimator;
 use super::plant::{Candidate, Free, Model, Nuisance, Plant, Signal, Term};
 use super::search::Search;
 use super::split::split;
@@ -17,6 +16,8 @@ pub(super) struct Waves {
     pub(super) tolerance: f64,
     /// Amplitude of the wave `late` that a share of 0 adds to a model, per amplitude of its wave `other`; 0 for runs without shares.
     pub(super) lateness: f64,
+    /// Work of a prediction with any cause; 1 without.
+    pub(super) work: u64,
 }
 
 const VALUES: usize = 400;
@@ -80,7 +81,7 @@ impl Waves {
         variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
         variant.starts = vec![vec![1.0, 1.0]];
         candidates.push(variant);
-        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0], tolerance: 0.0, lateness: 0.0 }
+        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0], tolerance: 0.0, lateness: 0.0, work: 1 }
     }
 }
 
@@ -99,6 +100,10 @@ impl Plant for Waves {
 
     fn candidates(&self) -> &[Candidate] {
         &self.candidates
+    }
+
+    fn work(&self, model: &Model, _run: usize) -> u64 {
+        if model.terms.is_empty() { 1 } else { self.work }
     }
 
     fn nuisances(&self, _run: usize) -> usize {
@@ -134,12 +139,5 @@ impl Plant for Waves {
 /// A search in a plant, from nothing.
 pub(super) fn search(plant: &Waves) -> Search<'_> {
     let split = split(plant, &[Role::Auto; 6]);
-    Search {
-        estimator: Estimator::new(plant),
-        split,
-        unexplained: 0.0,
-        limit: f64::INFINITY,
-        is_by_names: false,
-        progress: &|_: &str| {},
-    }
+    Search::new(plant, split, &|_: &str| {})
 }
