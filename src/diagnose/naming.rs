@@ -185,8 +185,9 @@ impl<'a> Place<'a> {
         Ok(models.iter().filter_map(|model| self.attempt(&start(model)?)).collect())
     }
 
-    /// Two or three names that are as good as the free form, none if none are, or if much is left with the free form, which they could follow: beside the best single ones of `tried`, then those that would take most
-    /// together. They may be of other places, as what a free form takes need not be of its place alone. Models that cannot be simulated are none.
+    /// Two or three names that are as good as the free form, none if none are, or if much is left with it, which several names could follow: beside the best single
+    /// ones of `tried`, then those that would take most together. They may be of other places, as what a free form takes need not be of its place alone. Models that
+    /// cannot be simulated are none.
     fn several(&self, tried: &[Attempt]) -> Option<Attempt> {
         if self.search.is_sought(&self.best) || !self.search.may_go_on() {
             return None;

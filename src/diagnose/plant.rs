@@ -166,7 +166,7 @@ pub trait Plant: Sync {
         0
     }
 
-    /// What a prediction of a run by `model` costs, in any unit.
+    /// What a prediction of a run by `model` costs, in any unit: a search ends after some thousand times what all runs cost without causes.
     fn work(&self, _model: &Model, _run: usize) -> u64 {
         1
     }
