@@ -1,7 +1,8 @@
 //! How much a search may simulate: where no law follows the data it would try others without end.
 //!
 //! The unit is a simulation of all runs at the discretisation that a search begins with, so that the budget does not depend on the length of the data, and what is
-//! spent does not depend on the machine or on the number of threads: a prediction that is asked for counts, even if it is known already.
+//! spent does not depend on the machine or on the number of threads: a prediction that a fit or a screening asks for counts, even if it is known already. What runs left
+//! out and the bench's faults need is not counted.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -86,7 +87,7 @@ mod tests {
     use crate::diagnose::waves::{Waves, search};
 
     #[test]
-    fn every_prediction_counts_whether_it_is_known_already_or_not() {
+    fn a_fit_s_predictions_count_whether_they_are_known_already_or_not() {
         let mut plant = Waves::new(&[("other", 3.0)]);
         plant.work = 3;
         let search = search(&plant);

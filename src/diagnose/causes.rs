@@ -55,7 +55,6 @@ pub(super) struct Causes {
 /// [`DiagnoseError`] if a model cannot be simulated.
 pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
     let before = (search.estimator.state(), search.split.clone());
-    let is_by_names = search.phase == Phase::ByNames;
     search.estimator.is_calibrated = true;
     let without = search.estimator.given_spread();
     let has_faults = calibrated.model().spread != without;
@@ -89,7 +88,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             let cost = plain.as_ref().map_or(f64::INFINITY, |plain| search.cost(&plain.best));
             let above = plain.as_ref().map_or(f64::INFINITY, |plain| search.above(&plain.best));
             let after = (search.estimator.state(), search.split.clone());
-            search.phase = if is_by_names { Phase::ByNames } else { Phase::WithFaults };
+            search.enter(Phase::WithFaults);
             search.estimator.restore(before.0.clone());
             search.estimator.held_spread = None;
             search.split = before.1.clone();
@@ -109,7 +108,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             }
         }
     };
-    search.phase = if is_by_names { Phase::ByNames } else { Phase::Naming };
+    search.enter(Phase::Naming);
     // What a name leaves, and what a cause takes, is no fault of the bench.
     search.estimator.held_spread = Some(causes.best.model().spread);
     name_causes(search, &mut causes, calibrated.model().resolution)?;

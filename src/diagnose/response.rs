@@ -14,7 +14,6 @@ const RISE: f64 = 3.0;
 const STEADY: f64 = 7.0;
 /// Longest wait (s).
 const LONGEST: f64 = 20.0;
-
 /// Periods from the beginning of the sampled one to the end of the run.
 const BEYOND: f64 = 1.5;
 

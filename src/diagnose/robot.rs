@@ -29,7 +29,7 @@ const STEPS_PER_PERIOD: f64 = 220.0;
 const GROUND_STEP: f64 = 1e-4;
 /// Kinds of effects that do nothing at 0 V.
 const ON_VOLTAGES: [Kind; 2] = [Kind::Driver, Kind::Actuation];
-/// Causes with which steps are repeated until friction agrees with its law.
+/// Causes with which the joints' steps are repeated until friction agrees with its law; a cable that drags is not counted so.
 const WITH_REPEATED_STEPS: [&str; 2] = ["dry-friction", "free-joint-friction"];
 /// Time steps in a period of a frequency response.
 const ROWS_PER_PERIOD: f64 = 40.0;
@@ -373,7 +373,9 @@ impl Plant for RobotPlant {
 
     /// Time steps, times joints and what a step costs without any (in joints), times repetitions of a step.
     fn work(&self, model: &Model, run: usize) -> u64 {
+        // Estimated from a profile at 40 joints.
         const OF_STEP: f64 = 16.0;
+        // A set with friction took 47 simulations a second where one without took 117.
         const REPETITIONS: f64 = 2.5;
         let Run { robot, response, step, .. } = &self.runs[run];
         let steps = match response {

@@ -204,6 +204,13 @@ impl<'a> Search<'a> {
 }
 
 impl Search<'_> {
+    /// Enters a phase, unless causes are sought by names only: then all is of that one.
+    pub(super) fn enter(&mut self, phase: Phase) {
+        if self.phase != Phase::ByNames {
+            self.phase = phase;
+        }
+    }
+
     /// True if something new may be begun; otherwise the search is cut short.
     pub(super) fn may_go_on(&self) -> bool {
         self.estimator.budget.allows(self.phase)
