@@ -335,6 +335,13 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_set_that_holds_the_cause_itself_is_no_tie() {
+        let is_tied = |tied: &[&str]| cause("a", 0.9, None, tied).is_tied();
+        assert_eq!([is_tied(&[]), is_tied(&["a+b", "a+c"])], [false; 2]);
+        assert_eq!([is_tied(&["b"]), is_tied(&["b+c"]), is_tied(&["a+b", "b"]), is_tied(&["aa+b"])], [true; 4]);
+    }
+
     /// Roles of causes that remove 1 of χ² per value each.
     fn roles(mut effects: Vec<Adopted>) -> Vec<Part> {
         let taken = vec![1.0; effects.len()];

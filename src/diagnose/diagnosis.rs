@@ -69,7 +69,7 @@ pub struct Adopted {
     pub cause: String,
     /// Its parameters.
     pub parameters: Vec<Estimate>,
-    /// Causes that the data cannot tell from it.
+    /// Causes, or sets of two with a plus sign, that the data cannot tell from it.
     pub tied_with: Vec<String>,
     /// Share of the misfit of the refined, re-tuned nominal model that comes back without it (0 to 1).
     pub share: f64,
@@ -86,6 +86,13 @@ pub struct Adopted {
     /// Parameters that were given: name and value.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<(String, f64)>,
+}
+
+impl Adopted {
+    /// True if something else may stand in its place. A set that holds the cause itself leaves open only what is beside it.
+    pub fn is_tied(&self) -> bool {
+        self.tied_with.iter().any(|set| set.split('+').all(|id| id != self.id))
+    }
 }
 
 /// The curve of a free form, with its pointwise 95 % band.

@@ -102,8 +102,10 @@ pub fn diagnose(
     let verdict = verdict(&search, &judged, &effects, insufficient.is_some());
     let tied_models = ties.models().map(|scored| scored.model().clone()).chain(pairs);
     let models: Vec<Model> = std::iter::once(judged.best.model().clone()).chain(tied_models).collect();
-    let next_experiment = match (verdict, dropped, &insufficient) {
-        (Verdict::Tied, ..) => separate(&models),
+    let is_open =
+        matches!(verdict, Verdict::Named | Verdict::Tied) && physics(&effects).any(|effect| !effect.tied_with.is_empty());
+    let next_experiment = match (is_open, dropped, &insufficient) {
+        (true, ..) => separate(&models),
         // With and without the last cause that was dropped.
         (_, Some(dropped), _) => separate(&[judged.best.model().clone(), dropped]),
         (_, None, Some(_)) => Some(MORE_RUNS.to_owned()),
@@ -202,7 +204,7 @@ fn verdict(search: &Search, judged: &Judged, effects: &[Adopted], is_insufficien
         () if is_nothing(effects) && is_insufficient && search.above(&judged.best) > LEFT_OVER => Verdict::Unexplained,
         () if is_nothing(effects) => Verdict::None,
         () if physics(effects).any(|effect| effect.curve.is_some()) => Verdict::Located,
-        () if physics(effects).any(|effect| !effect.tied_with.is_empty()) => Verdict::Tied,
+        () if physics(effects).any(Adopted::is_tied) => Verdict::Tied,
         () => Verdict::Named,
     }
 }

@@ -86,6 +86,20 @@ fn with_few_runs(main: String, findings: &Findings) -> String {
     format!("{} ({} runs {judged}).", main.strip_suffix('.').unwrap_or(&main), findings.runs)
 }
 
+/// What the data cannot tell apart, and what of it they determine; empty for nothing.
+fn ties(causes: &[&Adopted], combinations: &[Combination]) -> String {
+    let tied = causes.iter().filter(|effect| !effect.tied_with.is_empty()).map(|effect| {
+        let others: Vec<String> = effect.tied_with.iter().map(|id| names::cause(id)).collect();
+        format!("{} cannot be told from {}", names::cause(&effect.id), others.join(", "))
+    });
+    let tied: Vec<String> = tied.collect();
+    if tied.is_empty() {
+        return String::new();
+    }
+    let known: String = combinations.iter().map(|combination| format!("; {}", combination.words())).collect();
+    format!("; in these data {}{known}", tied.join("; "))
+}
+
 /// The verdict in a sentence.
 pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
     let Findings {
@@ -122,21 +136,10 @@ pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
                 "No cause in the library is needed: the nominal model{finely} leaves residuals of the size of the noise, but {failing}."
             ),
         },
-        Verdict::Named | Verdict::Located => {
+        Verdict::Named | Verdict::Located | Verdict::Tied => {
             let rest = if has_rest { format!(", and {:.1} % of the misfit is left", 100.0 * left) } else { String::new() };
-            format!("The simulation lacks: {named}{rest}{but}.")
-        }
-        Verdict::Tied => {
-            let ties: Vec<_> = physics
-                .iter()
-                .filter(|effect| !effect.tied_with.is_empty())
-                .map(|effect| {
-                    let others: Vec<String> = effect.tied_with.iter().map(|id| names::cause(id)).collect();
-                    format!("{} cannot be told from {}", names::cause(&effect.id), others.join(", "))
-                })
-                .collect();
-            let known: String = combinations.iter().map(|combination| format!("; {}", combination.words())).collect();
-            format!("The simulation lacks: {named}; in these data {}{known}{but}.", ties.join("; "))
+            let tied = ties(&physics, combinations);
+            format!("The simulation lacks: {named}{rest}{tied}{but}.")
         }
         Verdict::Unexplained => match (insufficient, physics.is_empty()) {
             (Some(insufficient), _) => {
@@ -193,6 +196,37 @@ mod tests {
             meaning: String::new(),
         };
         (0..count).map(test).collect()
+    }
+
+    fn cause(id: &str, tied_with: &[&str]) -> Adopted {
+        Adopted {
+            id: id.into(),
+            kind: "test".into(),
+            place: "test".into(),
+            cause: String::new(),
+            parameters: Vec::new(),
+            tied_with: tied_with.iter().map(|id| (*id).to_owned()).collect(),
+            share: 1.0,
+            role: Part::Cause,
+            stability: None,
+            curve: None,
+            nearest: Vec::new(),
+            gain_heldout: 1.0,
+            fixed: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_named_cause_says_what_cannot_be_told_from_it() {
+        let alone = [cause("tip-mass", &[])];
+        let beside = [cause("tip-mass", &["damping+tip-mass"])];
+        let of = |effects| summary(Verdict::Named, &Findings { effects, ..NOTHING });
+        assert!(!of(&alone).contains("told"), "{}", of(&alone));
+        assert!(
+            of(&beside).contains("; in these data tip mass cannot be told from damping time with tip mass"),
+            "{}",
+            of(&beside)
+        );
     }
 
     #[test]

@@ -42,7 +42,8 @@ pub fn names(d: &Diagnosis) -> Vec<&str> {
 pub fn is_right(d: &Diagnosis, hidden: &str) -> bool {
     let [effect] = physics(d)[..] else { return false };
     let set = INSEPARABLE.iter().find(|set| set.contains(&hidden)).copied().unwrap_or_default();
-    let allowed = |id: &str| id == hidden || set.contains(&id);
+    // A set of two that holds the cause leaves open what is beside it.
+    let allowed = |tied: &str| tied.split('+').any(|id| id == hidden || set.contains(&id));
     let is_nearest = effect.nearest.first().is_some_and(|near| allowed(&near.id));
     if d.verdict == Verdict::Located {
         return is_nearest;
