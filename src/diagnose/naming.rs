@@ -9,7 +9,7 @@ use super::DiagnoseError;
 use super::bench::Spread;
 use super::diagnosis::Nearest;
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, VISIBLE};
+use super::search::{PROMISING_IN_PLACE, SOUGHT, Scored, Search, VISIBLE};
 
 /// A name stands if it takes this share of what the free form takes on select runs.
 pub(super) const LEAST_TAKEN: f64 = 0.95;
@@ -108,7 +108,7 @@ impl<'a> Place<'a> {
             // What a name leaves beyond the free form may be another cause, or what its law does not follow.
             Some(one) => {
                 let several = self.several(std::slice::from_ref(one));
-                several.filter(|several| self.search.is_worth(&several.scored, &one.scored)).or(standing)
+                several.filter(|several| self.search.is_worth_in_place(&several.scored, &one.scored)).or(standing)
             }
             None => self.elsewhere().or_else(|| self.several(&others)),
         };
@@ -131,7 +131,7 @@ impl<'a> Place<'a> {
         let is_simpler = |other: &Attempt| {
             other.name != best.name
                 && other.scored.freedom() < best.scored.freedom()
-                && cost(other) <= cost(best) + self.tolerance()
+                && cost(other) <= cost(best) + self.search.tolerance()
         };
         let at = attempts.iter().position(is_simpler).unwrap_or(0);
         Some(attempts.swap_remove(at))
@@ -139,12 +139,7 @@ impl<'a> Place<'a> {
 
     /// True if an attempt costs less than a model with the free form, or hardly more.
     fn is_as_good(&self, attempt: &Attempt, free: &Scored) -> bool {
-        self.search.cost(&attempt.scored) <= self.search.cost(free) + self.tolerance()
-    }
-
-    /// By how much χ² of two discretisations of one physics may differ.
-    fn tolerance(&self) -> f64 {
-        LEAST_GAIN * self.search.estimator.count(&self.search.split.all()) as f64
+        self.search.cost(&attempt.scored) <= self.search.cost(free) + self.search.tolerance()
     }
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
@@ -268,13 +263,17 @@ impl<'a> Place<'a> {
         Ok(Some(alone).filter(|alone| self.taken(alone) >= LEAST_TAKEN))
     }
 
-    /// Share of what the free form takes on select runs that another model takes; on all runs where the select runs hardly show the place.
+    /// Share of what the free form takes that another model takes: the smaller one of those on all runs and on select runs, where these show the place. A saturation
+    /// of negative voltages takes all that select runs show if these have no others.
     fn taken(&self, scored: &Scored) -> f64 {
         let count = |runs: &[usize]| self.search.estimator.count(runs).max(1) as f64;
         let whole = (self.bare.total() - self.best.total()) / count(&self.search.split.all());
         let held = (self.bare.select - self.best.select) / count(&self.search.split.select);
-        let of = |scored: &Scored| if held > LEAST_SHOWN * whole { scored.select } else { scored.total() };
-        (of(&self.bare) - of(scored)) / (of(&self.bare) - of(&self.best)).max(f64::MIN_POSITIVE)
+        let share = |of: &dyn Fn(&Scored) -> f64| {
+            (of(&self.bare) - of(scored)) / (of(&self.bare) - of(&self.best)).max(f64::MIN_POSITIVE)
+        };
+        let of_all = share(&Scored::total);
+        if held > LEAST_SHOWN * whole { of_all.min(share(&|scored| scored.select)) } else { of_all }
     }
 
     /// A model whose last term is the name, the other causes with their plain laws if these do; none if it cannot be fitted.

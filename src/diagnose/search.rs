@@ -479,6 +479,11 @@ impl Search<'_> {
         self.estimator.count(runs) as f64 * LEAST_GAIN.max(LEAST_SHARE * self.unexplained)
     }
 
+    /// By how much χ² of two discretisations of one physics may differ.
+    pub(super) fn tolerance(&self) -> f64 {
+        LEAST_GAIN * self.estimator.count(&self.split.all()) as f64
+    }
+
     /// True if the additional parameters of `more` over `less` are beyond chance, however little they change.
     pub(super) fn is_significant(&self, more: &Scored, less: &Scored) -> bool {
         let runs = if self.split.select.is_empty() { &self.split.fit } else { &self.split.select };

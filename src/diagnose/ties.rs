@@ -1,10 +1,10 @@
 //! Ties: other causes, or two others together, that explain the data as well as an adopted one.
 
-use super::fit::coordinates;
+use super::fit::{Convergence, coordinates};
 use super::plant::{Candidate, Model, Term};
 use super::search::{LEAST_BIC, Responses, Scored, Screened, Search, Trial};
 
-/// Replacements are refitted like the best model if their χ² exceeds its own by no more than this.
+/// Replacements are refitted like the best model if their χ² exceeds its own by no more than this, or than two discretisations of one physics may differ by.
 const NEAR_TIE: f64 = 500.0;
 /// Two causes together are fitted in the place of one if their linear estimate is at least this share of what it takes.
 const PROMISING_PAIR: f64 = 0.9;
@@ -31,6 +31,7 @@ impl Ties {
     /// Compares the replacements that the search has `replaced` (the removed candidate, and the model without it) with the final model `best`; those
     /// near it (`coarse_total` is its χ² before the final refit) are refitted in the same way.
     pub(super) fn new(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_total: f64) -> Self {
+        let near = NEAR_TIE.max(search.tolerance());
         let compared = |(removed, trial): &(usize, Trial)| {
             let index = best.model().terms.iter().position(|term| term.candidate == *removed)?;
             let own = trial.scored.model().terms.iter().find(|term| term.candidate == trial.candidate)?;
@@ -44,8 +45,10 @@ impl Ties {
             let terms = best.model().terms.iter().enumerate();
             let terms = terms.map(|(at, term)| if at == index { own.clone() } else { in_trial(term).unwrap_or(term.clone()) });
             let model = Model { terms: terms.collect(), ..best.model().clone() };
-            let is_near = coordinates(&model).len() <= best.freedom() && trial.scored.total() < coarse_total + NEAR_TIE;
-            Some(match is_near.then(|| search.fitted(&model).ok()).flatten() {
+            let is_near = coordinates(&model).len() <= best.freedom() && trial.scored.total() < coarse_total + near;
+            // In the discretisation that suits it, as the best model.
+            let refitted = || Some(search.resolve(search.fitted(&model).ok()?, Convergence::Full));
+            Some(match is_near.then(refitted).flatten() {
                 Some(scored) => {
                     let is_tied = search.is_tied(best, &scored);
                     Replacement { index, trial: Trial { scored, ..trial.clone() }, is_tied }
