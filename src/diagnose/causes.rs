@@ -6,7 +6,7 @@ use super::diagnosis::{JudgedBy, Nearest};
 use super::fit::Convergence;
 use super::naming::{self, LEAST_TAKEN, Naming};
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, SOUGHT, Scored, Search, Trial, VISIBLE};
+use super::search::{LEAST_GAIN, PROMISING_IN_PLACE, Replacement, SOUGHT, Scored, Search, Trial, VISIBLE};
 use super::smoothing::smoothed;
 use super::unseen::Unseen;
 use super::verdict::LEFT_SHARE;
@@ -27,10 +27,8 @@ pub(super) struct Causes {
     pub(super) best: Scored,
     /// The candidates on top of re-tuned constants, best first.
     pub(super) trials: Vec<Trial>,
-    /// Replacements of every cause: the candidate that is removed, and the trial.
-    pub(super) replaced: Vec<(usize, Trial)>,
-    /// χ² of the best model before the final refit, with which replacements are compared.
-    pub(super) coarse_total: f64,
+    /// Replacements of every cause.
+    pub(super) replaced: Vec<Replacement>,
     /// Number of single values that were masked.
     pub(super) spikes: usize,
     /// Share of what re-tuned constants leave that the causes leave before faults of the bench.
@@ -158,7 +156,6 @@ fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Res
     causes.nearest = nearest;
     let best = search.backward(best)?;
     (causes.best, causes.replaced) = replace(search, best, resolution)?;
-    causes.coarse_total = causes.best.total();
     Ok(())
 }
 
@@ -172,7 +169,6 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     if search.is_given_up(&best) {
         search.estimator.held_spread = None;
         return Ok(Causes {
-            coarse_total: best.total(),
             best,
             trials,
             replaced: Vec::new(),
@@ -219,18 +215,7 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
         best = search.settle(best)?;
     }
     search.estimator.held_spread = None;
-    let coarse_total = best.total();
-    Ok(Causes {
-        best,
-        trials,
-        replaced,
-        coarse_total,
-        spikes,
-        share_left,
-        cost_with_faults,
-        open: f64::INFINITY,
-        nearest: Vec::new(),
-    })
+    Ok(Causes { best, trials, replaced, spikes, share_left, cost_with_faults, open: f64::INFINITY, nearest: Vec::new() })
 }
 
 /// The model with free constants at the `resolution` that the search began with, if it costs less: another discretisation shifts the resonances as a
@@ -288,36 +273,40 @@ fn one_for_all(search: &mut Search, best: &Scored) -> Option<Scored> {
 
 /// Replaces causes by others that leave less, or that need fewer parameters and leave hardly more, and the discretisation by constants at the `resolution` that the
 /// search began with: the model, and the replacements of its causes.
-fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored, Vec<(usize, Trial)>), DiagnoseError> {
-    // A model at the edge of what can be simulated has no derivatives to compare others by.
-    let replacements = |search: &Search, best: &Scored| {
-        let has_none = best.model().terms.is_empty() || !search.may_go_on();
-        if has_none { Vec::new() } else { search.replacements(best, REPLACEMENTS).unwrap_or_default() }
-    };
+fn replace(search: &mut Search, best: Scored, resolution: f64) -> Result<(Scored, Vec<Replacement>), DiagnoseError> {
     let mut best = constants_for_discretisation(search, best, resolution);
-    let mut replaced = replacements(search, &best);
+    let mut replaced = replacements(search, &best, Vec::new());
     for _ in 0..MOST_REPLACED {
         let better = replaced
             .iter()
-            .filter(|(removed, trial)| is_better(search, *removed, trial, &best))
-            .min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()));
-        let Some((_, better)) = better else { break };
-        best = search.settle(better.scored.clone())?;
+            .filter(|other| is_better(search, other, &best))
+            .min_by(|a, b| a.trial.scored.total().total_cmp(&b.trial.scored.total()));
+        let Some(better) = better else { break };
+        best = search.settle(better.trial.scored.clone())?;
         best = search.backward(best)?;
         // A cause in a constant's place lets the constant stay free beside it.
         best = search.with_significant_constants(best)?;
         best = constants_for_discretisation(search, best, resolution);
-        replaced = replacements(search, &best);
+        replaced = replacements(search, &best, replaced);
     }
     if let Some(one) = one_for_all(search, &best) {
         best = one;
-        replaced = replacements(search, &best);
+        replaced = replacements(search, &best, replaced);
     }
     if let Some(fewer) = fewer_for_all(search, &best)? {
         best = fewer;
-        replaced = replacements(search, &best);
+        replaced = replacements(search, &best, replaced);
     }
     Ok((best, replaced))
+}
+
+/// Replacements of the causes of a model; those of an `earlier` one where the search has to end. A model at the edge of what can be simulated has no derivatives to compare
+/// others by, and so none.
+fn replacements(search: &Search, best: &Scored, earlier: Vec<Replacement>) -> Vec<Replacement> {
+    if best.model().terms.is_empty() {
+        return Vec::new();
+    }
+    if search.may_go_on() { search.replacements(best, REPLACEMENTS).unwrap_or_default() } else { earlier }
 }
 
 /// Those of the causes that take [`LEAST_TAKEN`] of what all take, where all of them still leave so much that the verdict would be unexplained: the others stand for what the
@@ -347,38 +336,37 @@ fn fewer_for_all(search: &mut Search, best: &Scored) -> Result<Option<Scored>, D
 /// time steps of the search are wrong by, or the number of joints that suits one of the two: those that differ by no more are refitted with fine steps, each in the
 /// discretisation that suits it.
 fn least_with_fine_steps(search: &Search, best: Scored, causes: &mut Causes) -> Scored {
-    let limit = causes.coarse_total + search.tolerance();
-    let is_near = |(removed, trial): &&(usize, Trial)| {
-        search.id(*removed) != search.id(trial.candidate)
-            && trial.scored.freedom() <= best.freedom()
-            && trial.scored.total() < limit
+    let is_near = |other: &&Replacement| {
+        search.id(other.removed) != search.id(other.trial.candidate)
+            && other.trial.scored.freedom() <= best.freedom()
+            && other.excess < search.tolerance()
+            && best.model().terms.iter().any(|term| term.candidate == other.removed)
     };
-    let fine = |(removed, trial): &(usize, Trial)| {
-        (search.progress)(&format!("{} in the place of {} with fine steps", search.id(trial.candidate), search.id(*removed)));
-        let model = Model { fine: true, ..trial.scored.model().clone() };
-        let scored = search.resolve(search.fitted_at_its_spread(&model).ok()?, Convergence::Full);
-        Some((*removed, Trial { candidate: trial.candidate, scored }, trial.scored.total()))
+    let fine = |other: &Replacement| {
+        let Replacement { removed, trial: Trial { candidate, scored }, .. } = other;
+        (search.progress)(&format!("{} in the place of {} with fine steps", search.id(*candidate), search.id(*removed)));
+        let model = Model { fine: true, ..scored.model().clone() };
+        let scored = search.resolved_if_near(search.fitted_at_its_spread(&model).ok()?, &best);
+        let excess = scored.total() - best.total();
+        Some(Replacement { removed: *removed, trial: Trial { candidate: *candidate, scored }, excess })
     };
     let others = causes.replaced.iter().filter(is_near).filter_map(fine);
-    let least = others.min_by(|a, b| a.1.scored.total().total_cmp(&b.1.scored.total()));
-    let Some((removed, other, coarse_total)) = least.filter(|(_, other, _)| other.scored.total() < best.total() - LIKELIER)
-    else {
-        return best;
-    };
-    causes.coarse_total = coarse_total;
+    let least = others.min_by(|a, b| a.excess.total_cmp(&b.excess)).filter(|least| least.excess < -LIKELIER);
+    let Some(Replacement { removed, trial: Trial { candidate, scored }, excess }) = least else { return best };
     // The others in the place of the cause are now in that of the other one, and the cause is one of them.
-    causes.replaced.retain(|(of, trial)| *of != removed || search.id(trial.candidate) != search.id(other.candidate));
-    causes.replaced.iter_mut().filter(|(of, _)| *of == removed).for_each(|(of, _)| *of = other.candidate);
-    causes.replaced.push((other.candidate, Trial { candidate: removed, scored: best }));
-    other.scored
+    causes.replaced.retain(|other| other.removed != removed || search.id(other.trial.candidate) != search.id(candidate));
+    causes.replaced.iter_mut().filter(|other| other.removed == removed).for_each(|other| other.removed = candidate);
+    let trial = Trial { candidate: removed, scored: best };
+    causes.replaced.push(Replacement { removed: candidate, trial, excess: -excess });
+    scored
 }
 
-/// True if a trial is to be preferred to the model `best`, in which it takes the place of the candidate `removed`.
-fn is_better(search: &Search, removed: usize, trial: &Trial, best: &Scored) -> bool {
+/// True if a replacement is to be preferred to the model `best`.
+fn is_better(search: &Search, Replacement { removed, trial, .. }: &Replacement, best: &Scored) -> bool {
     let other = &trial.scored;
     // A law with a further parameter gives way to another cause that does without one and leaves hardly more.
-    let has_further = best.model().terms.iter().any(|t| t.candidate == removed && search.candidate(t).is_variant)
-        && search.id(trial.candidate) != search.id(removed);
+    let has_further = best.model().terms.iter().any(|t| t.candidate == *removed && search.candidate(t).is_variant)
+        && search.id(trial.candidate) != search.id(*removed);
     let simpler = other.freedom() < best.freedom()
         && (search.is_tied(best, other) || (has_further && !search.is_worth_in_place(best, other)));
     // Of tied causes the likelier one leads; more parameters have to be worth it.

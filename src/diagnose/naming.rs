@@ -8,6 +8,7 @@
 use super::DiagnoseError;
 use super::bench::Spread;
 use super::diagnosis::Nearest;
+use super::fit::Convergence;
 use super::plant::{Candidate, Model, Term};
 use super::search::{PROMISING_IN_PLACE, SOUGHT, Scored, Search, VISIBLE};
 
@@ -102,7 +103,7 @@ impl<'a> Place<'a> {
             }
         }
         let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
-        let standing = self.simplest(standing);
+        let standing = self.simplest(standing).map(|one| self.resolved(one));
         let found = match &standing {
             Some(one) if self.is_as_good(one, &self.best) => standing,
             // What a name leaves beyond the free form may be another cause, or what its law does not follow.
@@ -137,6 +138,16 @@ impl<'a> Place<'a> {
         Some(attempts.swap_remove(at))
     }
 
+    /// An attempt in the discretisation that suits it, if it takes as much as a name has to but is not as good as the free form: the discretisation of that may make up
+    /// for what the form follows and should not.
+    fn resolved(&self, attempt: Attempt) -> Attempt {
+        if attempt.taken < LEAST_TAKEN || self.is_as_good(&attempt, &self.best) {
+            return attempt;
+        }
+        let scored = self.search.resolve(attempt.scored, Convergence::Rank);
+        Attempt { name: attempt.name, taken: self.taken(&scored), scored }
+    }
+
     /// True if an attempt costs less than a model with the free form, or hardly more.
     fn is_as_good(&self, attempt: &Attempt, free: &Scored) -> bool {
         self.search.cost(&attempt.scored) <= self.search.cost(free) + self.search.tolerance()
@@ -166,7 +177,7 @@ impl<'a> Place<'a> {
             return None;
         }
         let tried = self.promising(|candidate| !(candidate.is_free_form || self.is_name(candidate)), 0).ok()?;
-        self.simplest(tried).filter(|attempt| self.is_as_good(attempt, &self.best))
+        self.simplest(tried).map(|one| self.resolved(one)).filter(|attempt| self.is_as_good(attempt, &self.best))
     }
 
     /// Promising single ones of those candidates that are wanted, and the first `least` even if they are far.
@@ -197,7 +208,7 @@ impl<'a> Place<'a> {
         for first in firsts {
             found.extend(self.beside(&first.scored).unwrap_or_default());
         }
-        let mut found = self.least(found);
+        let mut found = self.least(found).map(|pair| self.resolved(pair));
         if found.as_ref().is_some_and(|pair| self.is_as_good(pair, &self.best)) {
             return found;
         }
@@ -208,7 +219,8 @@ impl<'a> Place<'a> {
         for size in [2, 3] {
             let sets = self.search.sets(base.model(), &screened, size, |_| true);
             let sets = sets.iter().take(MOST_SETS).filter_map(|(_, model)| self.search.start_beyond(model, &screened).ok());
-            found = self.least(sets.filter_map(|start| self.attempt(&start)).chain(found).collect());
+            found =
+                self.least(sets.filter_map(|start| self.attempt(&start)).chain(found).collect()).map(|set| self.resolved(set));
             if found.as_ref().is_some_and(|set| self.is_as_good(set, &self.best)) {
                 return found;
             }
@@ -222,7 +234,7 @@ impl<'a> Place<'a> {
         }
         // ... and the free form may have made up for a wrong cause elsewhere, as a delay of the camera in the place of one of the driver.
         let replaced = self.search.replacements(&near.scored, MOST_NAMES).ok()?.into_iter();
-        let others = replaced.map(|(_, trial)| Attempt { scored: trial.scored, ..near });
+        let others = replaced.map(|other| Attempt { scored: other.trial.scored, ..near });
         self.least(others.collect()).filter(|set| self.is_as_good(set, &free))
     }
 

@@ -78,7 +78,7 @@ pub fn diagnose(
     let [nominal, calibrated, best] = [nominal, calibrated, judged.best].map(|scored| search.with_judged(scored));
     let (nominal, calibrated, judged) = (nominal?, calibrated?, Judged { best: best?, ..judged });
     progress("tied causes");
-    let ties = Ties::new(&search, &judged.best, &causes.replaced, causes.coarse_total);
+    let ties = Ties::new(&search, &judged.best, &causes.replaced);
     let Adoption { effects, unseen, pairs } = adopted(&search, &judged, &bare, &causes, &ties)?;
     let insufficient = insufficient.or(too_few.filter(|_| is_nothing(&effects)));
     let mut remarks = doubts;

@@ -136,6 +136,17 @@ pub struct Trial {
     pub scored: Scored,
 }
 
+/// A candidate fitted in the place of a term.
+#[derive(Debug, Clone)]
+pub struct Replacement {
+    /// The candidate of the term.
+    pub removed: usize,
+    /// The candidate in its place, with the model.
+    pub trial: Trial,
+    /// By how much χ² of all runs exceeds that of the model with the term.
+    pub excess: f64,
+}
+
 /// What a model's coordinates and the candidates do to the residuals of all runs, to first order about the model.
 pub(super) struct Responses {
     /// The model.
@@ -975,12 +986,12 @@ impl Search<'_> {
         if is_constant { self.is_significant_on(&self.split.all(), more, less) } else { self.is_worth(more, less) }
     }
 
-    /// Replaces every cause by other candidates, `most` of each: the candidate that is removed, and the trial.
+    /// Replaces every cause by other candidates, `most` of each.
     ///
     /// # Errors
     /// [`DiagnoseError`] if the derivatives of a model cannot be simulated.
-    pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<(usize, Trial)>, DiagnoseError> {
-        let mut found = Vec::new();
+    pub fn replacements(&self, best: &Scored, most: usize) -> Result<Vec<Replacement>, DiagnoseError> {
+        let mut found: Vec<(usize, Trial)> = Vec::new();
         (self.progress)("screening all candidates beside the causes");
         let responses = self.responses(best.model(), |_, candidate| !(candidate.is_free_form || candidate.is_variant))?;
         for (index, removed) in best.model().terms.iter().enumerate() {
@@ -1022,7 +1033,11 @@ impl Search<'_> {
                 found.push((removed.candidate, Trial { candidate, scored }));
             }
         }
-        Ok(found)
+        let replacement = |(removed, trial): (usize, Trial)| {
+            let excess = trial.scored.total() - best.total();
+            Replacement { removed, trial, excess }
+        };
+        Ok(found.into_iter().map(replacement).collect())
     }
 
     /// Other laws of the causes of the model `without` a constant: next to a plain law it may stand for a further parameter, as damping does for that of a clamp.
@@ -1085,6 +1100,11 @@ impl Search<'_> {
                 return best;
             }
         }
+    }
+
+    /// A rival of the model `best` in the discretisation that suits it as the best one's does, if another one may make up for what it leaves beyond that.
+    pub(super) fn resolved_if_near(&self, rival: Scored, best: &Scored) -> Scored {
+        if rival.total() < best.total() + self.tolerance() { self.resolve(rival, Convergence::Full) } else { rival }
     }
 
     /// A model with its coordinates moved, within their bounds.
@@ -1252,8 +1272,8 @@ mod tests {
         let terms = [0, 2].map(|candidate| Term { candidate, x: vec![1.0] });
         let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
         let replaced = search.replacements(&best, 1).unwrap();
-        let law = replaced.iter().find(|(removed, trial)| (*removed, trial.candidate) == (0, 3));
-        assert!((law.unwrap().1.scored.total() - best.total()).abs() < 1.0);
+        let law = replaced.iter().find(|other| (other.removed, other.trial.candidate) == (0, 3));
+        assert!((law.unwrap().trial.scored.total() - best.total()).abs() < 1.0);
     }
 
     #[test]
@@ -1263,8 +1283,8 @@ mod tests {
         let best = search.fitted(&Model::new(vec![Term { candidate: 1, x: vec![1.0] }], 1.0, false)).unwrap();
         let replaced = search.replacements(&best, 1).unwrap();
         let [plain, law] =
-            [2, 3].map(|of| replaced.iter().find(|(removed, trial)| (*removed, trial.candidate) == (1, of)).unwrap());
-        assert!(search.above(&plain.1.scored) > 0.4 && search.above(&law.1.scored) < 0.1, "{replaced:?}");
+            [2, 3].map(|of| replaced.iter().find(|other| (other.removed, other.trial.candidate) == (1, of)).unwrap());
+        assert!(search.above(&plain.trial.scored) > 0.4 && search.above(&law.trial.scored) < 0.1, "{replaced:?}");
     }
 
     /// Two models that leave nothing but noise and a wave of that amplitude, the first one with all residuals smaller by shares of the fit and the select runs.

@@ -1,8 +1,8 @@
 //! Ties: other causes, or two others together, that explain the data as well as an adopted one.
 
-use super::fit::{Convergence, coordinates};
+use super::fit::coordinates;
 use super::plant::{Candidate, Model, Term};
-use super::search::{LEAST_BIC, Responses, Scored, Screened, Search, Trial};
+use super::search::{LEAST_BIC, Replacement, Responses, Scored, Screened, Search, Trial};
 
 /// Replacements are refitted like the best model if their χ² exceeds its own by no more than this, or than two discretisations of one physics may differ by.
 const NEAR_TIE: f64 = 500.0;
@@ -13,8 +13,8 @@ const MOST_PAIRS: usize = 3;
 /// A cause shares its place with another one if that moves its first parameter by this share of the distance from where it has no effect.
 const LEAST_MOVED: f64 = 0.25;
 
-/// A replacement of an adopted cause.
-struct Replacement {
+/// A replacement of an adopted cause, compared with it.
+struct Compared {
     /// Index of the adopted term.
     index: usize,
     /// The model with the replacement as its last term.
@@ -24,15 +24,15 @@ struct Replacement {
 
 /// Replacements of all adopted causes.
 pub(super) struct Ties {
-    replacements: Vec<Replacement>,
+    replacements: Vec<Compared>,
 }
 
 impl Ties {
-    /// Compares the replacements that the search has `replaced` (the removed candidate, and the model without it) with the final model `best`; those
-    /// near it (`coarse_total` is its χ² before the final refit) are refitted in the same way.
-    pub(super) fn new(search: &Search, best: &Scored, replaced: &[(usize, Trial)], coarse_total: f64) -> Self {
+    /// Compares the replacements that the search has fitted with the final model `best`; those near the model whose cause they replace are refitted in the
+    /// same way.
+    pub(super) fn new(search: &Search, best: &Scored, replaced: &[Replacement]) -> Self {
         let near = NEAR_TIE.max(search.tolerance());
-        let compared = |(removed, trial): &(usize, Trial)| {
+        let compared = |Replacement { removed, trial, excess }: &Replacement| {
             let index = best.model().terms.iter().position(|term| term.candidate == *removed)?;
             let own = trial.scored.model().terms.iter().find(|term| term.candidate == trial.candidate)?;
             let is_there = best.model().terms.iter().any(|term| search.id(term.candidate) == search.id(trial.candidate));
@@ -45,17 +45,16 @@ impl Ties {
             let terms = best.model().terms.iter().enumerate();
             let terms = terms.map(|(at, term)| if at == index { own.clone() } else { in_trial(term).unwrap_or(term.clone()) });
             let model = Model { terms: terms.collect(), ..best.model().clone() };
-            let is_near = coordinates(&model).len() <= best.freedom() && trial.scored.total() < coarse_total + near;
-            // In the discretisation that suits it, as the best model.
-            let refitted = || Some(search.resolve(search.fitted(&model).ok()?, Convergence::Full));
+            let is_near = coordinates(&model).len() <= best.freedom() && *excess < near;
+            let refitted = || search.fitted(&model).ok().map(|scored| search.resolved_if_near(scored, best));
             Some(match is_near.then(refitted).flatten() {
                 Some(scored) => {
                     let is_tied = search.is_tied(best, &scored);
-                    Replacement { index, trial: Trial { scored, ..trial.clone() }, is_tied }
+                    Compared { index, trial: Trial { scored, ..trial.clone() }, is_tied }
                 }
                 // With constants that the final elimination has left out it is no rival.
                 None if trial.scored.model().terms.len() != model.terms.len() => return None,
-                None => Replacement { index, trial: trial.clone(), is_tied: false },
+                None => Compared { index, trial: trial.clone(), is_tied: false },
             })
         };
         Self { replacements: replaced.iter().filter_map(compared).collect() }
