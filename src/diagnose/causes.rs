@@ -467,4 +467,35 @@ mod tests {
             assert_eq!(model.resolution, resolution, "{hidden}");
         }
     }
+
+    #[test]
+    fn near_rivals_are_compared_in_the_discretisation_that_suits_each() {
+        // A resolution of 1.2 does what is missing beside either cause; without it the right one leaves more than the other one with it.
+        for (hidden, found) in [("first", 1), ("second", 2)] {
+            let mut plant = Waves::new(&[(hidden, 1.5), ("other", 0.2)]);
+            plant.resolutions = vec![1.0, 1.2];
+            let search = search(&plant);
+            let fitted = |candidate: usize, resolution: f64, fine: bool| {
+                search.fitted(&Model::new(vec![Term { candidate, x: vec![1.0] }], resolution, fine)).unwrap()
+            };
+            let (best, other) = (fitted(2, 1.2, true), fitted(1, 1.0, false));
+            let excess = other.total() - fitted(2, 1.2, false).total();
+            let trial = Trial { candidate: 1, scored: other };
+            let mut causes = Causes {
+                best: best.clone(),
+                trials: Vec::new(),
+                replaced: vec![Replacement { removed: 2, trial, excess }],
+                spikes: 0,
+                share_left: 0.0,
+                cost_with_faults: f64::INFINITY,
+                open: f64::INFINITY,
+                nearest: Vec::new(),
+            };
+            let least = least_with_fine_steps(&search, best, &mut causes);
+            assert_eq!((least.model().terms[0].candidate, least.model().resolution), (found, 1.2), "{hidden}");
+            // The other one of the two is what stands in its place.
+            let [Replacement { removed, trial, .. }] = &causes.replaced[..] else { panic!("{:?}", causes.replaced) };
+            assert_eq!((*removed, trial.candidate), (found, 3 - found), "{hidden}");
+        }
+    }
 }

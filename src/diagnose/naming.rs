@@ -342,4 +342,39 @@ mod tests {
             assert_eq!(names, if stands { [1] } else { [0] }, "{hidden}");
         }
     }
+
+    #[test]
+    fn a_name_that_takes_all_that_select_runs_show_has_to_take_what_the_others_do() {
+        // The first run, which is not selected on, has the wave with twice the amplitude: a free form takes 18 per value there and 4.5 in each of the others, the name 13.5.
+        for (hidden, taken) in [(vec![("other", 3.0)], 1.0), (vec![("other", 3.0), ("once", 3.0)], 36.0 / 40.5)] {
+            let mut plant = Waves::new(&hidden);
+            let free = Candidate { is_free_form: true, ..candidate("once") };
+            plant.candidates = vec![free, candidate("other")];
+            let mut search = search(&plant);
+            search.split.select.retain(|run| *run > 0);
+            search.split.fit = (0..6).filter(|run| !search.split.select.contains(run)).collect();
+            let terms = [0, 1].map(|candidate| Term { candidate, x: vec![1.0] });
+            let open = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
+            let place = Place::new(&search, &open, 0).unwrap();
+            let name =
+                search.estimator.fit(&Model::new(terms[1..].to_vec(), 1.0, false), &search.split.select, Convergence::Full);
+            let name = search.score(name.unwrap()).unwrap();
+            assert!((place.taken(&name) - taken).abs() < 0.01, "{hidden:?} {}", place.taken(&name));
+        }
+    }
+
+    #[test]
+    fn a_name_is_compared_with_a_free_form_in_the_discretisation_that_suits_it() {
+        // A resolution of 2 does what an amplitude of 1 does: the free form is as good with it, the name is not.
+        for (least, resolution) in [(2.4, 1.0), (1.5, 2.0)] {
+            let mut plant = Waves::new(&[("other", 3.0)]);
+            plant.resolutions = vec![1.0, 2.0];
+            plant.candidates = vec![Candidate { is_free_form: true, ..candidate("other") }, candidate("name")];
+            plant.candidates[1].parameters[0].bounds = [least, 10.0];
+            let mut search = search(&plant);
+            let open = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![1.0] }], 2.0, false)).unwrap();
+            let named = name(&mut search, open).unwrap().best;
+            assert_eq!((named.model().terms[0].candidate, named.model().resolution), (1, resolution), "{least}");
+        }
+    }
 }
