@@ -206,7 +206,11 @@ fn select(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Re
     let (mut best, replaced) = if is_insufficient || has_free_forms(search, &best) {
         (best, Vec::new())
     } else {
-        replace(search, best, calibrated.model().resolution)?
+        let phase = search.phase;
+        search.phase = phase.of_replacements();
+        let replaced = replace(search, best, calibrated.model().resolution)?;
+        search.phase = phase;
+        replaced
     };
     if faults_come_last {
         search.estimator.held_spread = None;
