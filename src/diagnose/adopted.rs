@@ -318,21 +318,7 @@ mod tests {
     use crate::diagnose::waves::{Waves, search};
 
     fn cause(id: &str, share: f64, stability: Option<f64>, tied_with: &[&str]) -> Adopted {
-        Adopted {
-            id: id.into(),
-            kind: "test".into(),
-            place: "test".into(),
-            cause: String::new(),
-            parameters: Vec::new(),
-            tied_with: tied_with.iter().map(|id| (*id).to_owned()).collect(),
-            share,
-            role: Part::Cause,
-            stability,
-            curve: None,
-            nearest: Vec::new(),
-            gain_heldout: 0.0,
-            fixed: Vec::new(),
-        }
+        Adopted { share, stability, ..Adopted::of_test(id, tied_with) }
     }
 
     #[test]

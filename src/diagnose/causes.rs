@@ -502,4 +502,19 @@ mod tests {
             assert_eq!((*removed, trial.candidate), (found, 3 - found), "{hidden}");
         }
     }
+
+    #[test]
+    fn replacements_stay_known_where_the_search_has_to_end() {
+        // With the second number a fit costs more than a search may spend.
+        for (work, is_cut) in [(1, false), (100_000, true)] {
+            let mut plant = Waves::new(&[("first", 3.0)]);
+            plant.work = work;
+            let search = search(&plant);
+            let best = search.fitted(&Model::new(vec![Term { candidate: 1, x: vec![1.0] }], 1.0, false)).unwrap();
+            let trial = Trial { candidate: 0, scored: best.clone() };
+            let earlier = vec![Replacement { removed: 1, trial, excess: 7.0 }];
+            let found: Vec<usize> = replacements(&search, &best, earlier).iter().map(|other| other.trial.candidate).collect();
+            assert_eq!((found == [0], found.contains(&2)), (is_cut, !is_cut), "{found:?}");
+        }
+    }
 }

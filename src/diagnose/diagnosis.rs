@@ -95,6 +95,28 @@ impl Adopted {
     }
 }
 
+#[cfg(test)]
+impl Adopted {
+    /// A cause that takes everything, for tests.
+    pub(super) fn of_test(id: &str, tied_with: &[&str]) -> Self {
+        Self {
+            id: id.into(),
+            kind: "test".into(),
+            place: "test".into(),
+            cause: String::new(),
+            parameters: Vec::new(),
+            tied_with: tied_with.iter().map(|id| (*id).to_owned()).collect(),
+            share: 1.0,
+            role: Part::Cause,
+            stability: None,
+            curve: None,
+            nearest: Vec::new(),
+            gain_heldout: 0.0,
+            fixed: Vec::new(),
+        }
+    }
+}
+
 /// The curve of a free form, with its pointwise 95 % band.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curve {

@@ -183,12 +183,7 @@ fn decide(search: &Search, best: Scored, bare: &Scored, open: f64, nominal_resol
             insufficient.get_or_insert_with(|| words.clone());
         }
         doubts.push(words);
-        let mut best = search.fitted(&model)?;
-        // Constants may be needed without a cause that were not beside it; one that is doubtful itself does not come back.
-        if !search.candidate(&judged.best.model().terms[index]).is_constant {
-            best = search.with_significant_constants(best)?;
-        }
-        judged = judge(search, best, bare, f64::INFINITY, nominal_resolution)?;
+        judged = judge(search, search.fitted(&model)?, bare, f64::INFINITY, nominal_resolution)?;
     }
     judged.remark = remark.or(judged.remark);
     Ok(Decided { judged, doubts, insufficient, dropped })

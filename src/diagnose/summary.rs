@@ -198,28 +198,10 @@ mod tests {
         (0..count).map(test).collect()
     }
 
-    fn cause(id: &str, tied_with: &[&str]) -> Adopted {
-        Adopted {
-            id: id.into(),
-            kind: "test".into(),
-            place: "test".into(),
-            cause: String::new(),
-            parameters: Vec::new(),
-            tied_with: tied_with.iter().map(|id| (*id).to_owned()).collect(),
-            share: 1.0,
-            role: Part::Cause,
-            stability: None,
-            curve: None,
-            nearest: Vec::new(),
-            gain_heldout: 1.0,
-            fixed: Vec::new(),
-        }
-    }
-
     #[test]
     fn a_named_cause_says_what_cannot_be_told_from_it() {
-        let alone = [cause("tip-mass", &[])];
-        let beside = [cause("tip-mass", &["damping+tip-mass"])];
+        let alone = [Adopted::of_test("tip-mass", &[])];
+        let beside = [Adopted::of_test("tip-mass", &["damping+tip-mass"])];
         let of = |effects| summary(Verdict::Named, &Findings { effects, ..NOTHING });
         assert!(!of(&alone).contains("told"), "{}", of(&alone));
         assert!(
