@@ -135,7 +135,9 @@ pub(super) fn numerics(search: &Search, best: &Scored) -> Result<Vec<f64>, Diagn
     others.push((search.ranked(&Model { fine: false, ..best.model().clone() })?, 1.0));
     others.push((search.ranked(&search.with_constants(best.model()))?, 1.0));
     for (other, share) in &others {
-        for (moved, (a, b)) in moved.iter_mut().zip(own.iter().zip(values_of(other.model()))) {
+        // Missing constants come first.
+        let values = values_of(other.model());
+        for (moved, (a, b)) in moved.iter_mut().zip(own.iter().zip(&values[values.len() - own.len()..])) {
             *moved = f64::hypot(*moved, share * (a - b));
         }
     }

@@ -55,7 +55,7 @@ pub fn name(search: &mut Search, open: Scored) -> Result<Naming, DiagnoseError> 
 /// A free form of a model, to be replaced by names.
 struct Place<'a> {
     search: &'a Search<'a>,
-    /// The model with the free form.
+    /// The model with the free form and all constants: what the free form does in the place of a constant is not its own.
     best: Scored,
     /// The free form.
     free: Term,
@@ -84,7 +84,7 @@ impl<'a> Place<'a> {
 
     fn with_spread(search: &'a Search<'a>, best: &Scored, index: usize, spread: Spread) -> Result<Self, DiagnoseError> {
         let free = best.model().terms[index].clone();
-        let mut model = Model { spread, ..best.model().clone() };
+        let mut model = search.with_constants(&Model { spread, ..best.model().clone() });
         let best = search.fitted_at_its_spread(&model)?;
         let is_of_place = |term: &Term| is_of(search, &free, term) && !search.candidate(term).is_constant;
         model.terms.retain(|term| term.candidate != free.candidate && !is_of_place(term));
@@ -105,7 +105,7 @@ impl<'a> Place<'a> {
         let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
         let standing = self.simplest(standing).map(|one| self.resolved(one));
         let found = match &standing {
-            Some(one) if self.is_as_good(one, &self.best) => standing,
+            Some(one) if self.is_as_good(one) => standing,
             // What a name leaves beyond the free form may be another cause, or what its law does not follow.
             Some(one) => {
                 let several = self.several(std::slice::from_ref(one));
@@ -141,27 +141,21 @@ impl<'a> Place<'a> {
     /// An attempt in the discretisation that suits it, if it takes as much as a name has to but is not as good as the free form: the discretisation of that may make up
     /// for what the form follows and should not.
     fn resolved(&self, attempt: Attempt) -> Attempt {
-        if attempt.taken < LEAST_TAKEN || self.is_as_good(&attempt, &self.best) {
+        if attempt.taken < LEAST_TAKEN || self.is_as_good(&attempt) {
             return attempt;
         }
         let scored = self.search.resolve(attempt.scored, Convergence::Rank);
         Attempt { name: attempt.name, taken: self.taken(&scored), scored }
     }
 
-    /// True if an attempt costs less than a model with the free form, or hardly more.
-    fn is_as_good(&self, attempt: &Attempt, free: &Scored) -> bool {
-        self.search.cost(&attempt.scored) <= self.search.cost(free) + self.search.tolerance()
+    /// True if an attempt costs less than the free form, or hardly more.
+    fn is_as_good(&self, attempt: &Attempt) -> bool {
+        self.search.cost(&attempt.scored) <= self.search.cost(&self.best) + self.search.tolerance()
     }
 
     /// Single names: the promising ones, and those that are in the model beside the free form.
     fn single(&self) -> Result<Vec<Attempt>, DiagnoseError> {
         let mut tried = self.promising(|candidate| self.is_name(candidate), 1)?;
-        if tried.iter().all(|attempt| attempt.taken < LEAST_TAKEN) {
-            // Constants that the free form did not need may make up for what a name lacks.
-            let most = tried.iter().max_by(|a, b| a.taken.total_cmp(&b.taken));
-            let with = most.and_then(|most| self.attempt(&self.search.with_constants(most.scored.model())));
-            tried.extend(with.map(|with| Attempt { name: most.map_or(with.name, |most| most.name), ..with }));
-        }
         if let Some(kept) = self.kept() {
             let of_place = kept.terms.iter().rfind(|term| is_of(self.search, &self.free, term));
             let name = of_place.map(|term| self.search.candidate(term).id);
@@ -177,7 +171,7 @@ impl<'a> Place<'a> {
             return None;
         }
         let tried = self.promising(|candidate| !(candidate.is_free_form || self.is_name(candidate)), 0).ok()?;
-        self.simplest(tried).map(|one| self.resolved(one)).filter(|attempt| self.is_as_good(attempt, &self.best))
+        self.simplest(tried).map(|one| self.resolved(one)).filter(|attempt| self.is_as_good(attempt))
     }
 
     /// Promising single ones of those candidates that are wanted, and the first `least` even if they are far.
@@ -209,7 +203,7 @@ impl<'a> Place<'a> {
             found.extend(self.beside(&first.scored).unwrap_or_default());
         }
         let mut found = self.least(found).map(|pair| self.resolved(pair));
-        if found.as_ref().is_some_and(|pair| self.is_as_good(pair, &self.best)) {
+        if found.as_ref().is_some_and(|pair| self.is_as_good(pair)) {
             return found;
         }
         // Beside the named causes of the place that are in the model.
@@ -221,21 +215,15 @@ impl<'a> Place<'a> {
             let sets = sets.iter().take(MOST_SETS).filter_map(|(_, model)| self.search.start_beyond(model, &screened).ok());
             found =
                 self.least(sets.filter_map(|start| self.attempt(&start)).chain(found).collect()).map(|set| self.resolved(set));
-            if found.as_ref().is_some_and(|set| self.is_as_good(set, &self.best)) {
+            if found.as_ref().is_some_and(|set| self.is_as_good(set)) {
                 return found;
             }
         }
         let near = found.filter(|set| self.is_near(set))?;
-        // Constants that the free form did not need may make up for what the names lack, ...
-        let free = self.search.fitted_at_its_spread(&self.search.with_constants(self.best.model())).ok()?;
-        let near = self.attempt(&self.search.with_constants(near.scored.model()))?;
-        if self.is_as_good(&near, &free) {
-            return Some(near);
-        }
-        // ... and the free form may have made up for a wrong cause elsewhere, as a delay of the camera in the place of one of the driver.
+        // The free form may have made up for a wrong cause elsewhere, as a delay of the camera in the place of one of the driver.
         let replaced = self.search.replacements(&near.scored, MOST_NAMES).ok()?.into_iter();
         let others = replaced.map(|other| Attempt { scored: other.trial.scored, ..near });
-        self.least(others.collect()).filter(|set| self.is_as_good(set, &free))
+        self.least(others.collect()).filter(|set| self.is_as_good(set))
     }
 
     /// True if what an attempt leaves beyond the free form would be minor.
@@ -360,6 +348,24 @@ mod tests {
                 search.estimator.fit(&Model::new(terms[1..].to_vec(), 1.0, false), &search.split.select, Convergence::Full);
             let name = search.score(name.unwrap()).unwrap();
             assert!((place.taken(&name) - taken).abs() < 0.01, "{hidden:?} {}", place.taken(&name));
+        }
+    }
+
+    #[test]
+    fn a_name_takes_nothing_by_what_a_constant_does() {
+        // Nearly all that the free form takes is what the constant does; the first name does that, the second name what `first` does.
+        for (hidden, found) in [("late", 2), ("first", 3)] {
+            let mut plant = Waves::new(&[(hidden, 1.0), ("other", 10.0)]);
+            let of = plant.candidates[3].clone();
+            let free = Candidate { id: hidden, is_free_form: true, is_variant: false, ..of };
+            plant.candidates =
+                vec![Candidate { is_constant: true, ..candidate("other") }, candidate("name"), free, candidate("second")];
+            let mut search = search(&plant);
+            let open = search.fitted(&Model::new(vec![Term { candidate: 2, x: vec![1.0, 1.0] }], 1.0, false)).unwrap();
+            let named = name(&mut search, open).unwrap().best;
+            let named = search.backward(named).unwrap();
+            let causes: Vec<usize> = named.model().terms.iter().map(|term| term.candidate).filter(|c| *c > 0).collect();
+            assert_eq!(causes, [found], "{hidden}");
         }
     }
 

@@ -564,11 +564,13 @@ impl Search<'_> {
             .collect()
     }
 
-    /// The model with all constants free; missing ones are appended.
+    /// The model with all constants free; missing ones come first.
     pub fn with_constants(&self, model: &Model) -> Model {
-        let mut all = model.clone();
-        all.terms.extend(self.constants().into_iter().filter(|c| model.terms.iter().all(|term| term.candidate != c.candidate)));
-        all
+        Model { terms: [self.missing_constants(model), model.terms.clone()].concat(), ..model.clone() }
+    }
+
+    fn missing_constants(&self, model: &Model) -> Vec<Term> {
+        self.constants().into_iter().filter(|c| model.terms.iter().all(|term| term.candidate != c.candidate)).collect()
     }
 
     /// The model with those of the missing constants that are significant beside its causes.
@@ -577,7 +579,7 @@ impl Search<'_> {
     /// [`DiagnoseError`] if the model cannot be simulated with all constants.
     pub fn with_significant_constants(&self, from: Scored) -> Result<Scored, DiagnoseError> {
         let own = from.model().terms.len();
-        let missing = self.with_constants(from.model()).terms.split_off(own);
+        let missing = self.missing_constants(from.model());
         let is_missing = |c: &Candidate| missing.iter().any(|term| self.id(term.candidate) == c.id);
         let screened = self.screen_of(&from, is_missing)?;
         let of = |term: &Term| screened.columns.iter().find(|(start, _)| start.candidate == term.candidate);
