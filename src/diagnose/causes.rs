@@ -52,7 +52,7 @@ pub(super) struct Causes {
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.
 pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bool) -> Result<Causes, DiagnoseError> {
-    let before = search.estimator.state();
+    let before = (search.estimator.state(), search.split.clone());
     search.estimator.is_calibrated = true;
     let without = search.estimator.given_spread();
     let has_faults = calibrated.model().spread != without;
@@ -85,10 +85,11 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
             (search.progress)("causes with faults of the bench in the way");
             let cost = plain.as_ref().map_or(f64::INFINITY, |plain| search.cost(&plain.best));
             let above = plain.as_ref().map_or(f64::INFINITY, |plain| search.above(&plain.best));
-            let after = search.estimator.state();
+            let after = (search.estimator.state(), search.split.clone());
             search.enter(Phase::WithFaults);
-            search.estimator.restore(before.clone());
+            search.estimator.restore(before.0.clone());
             search.estimator.held_spread = None;
+            search.split = before.1.clone();
             search.set_unexplained(calibrated);
             let other = select(search, calibrated, is_insufficient)?;
             match plain {
@@ -96,7 +97,8 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
                     if search.cost(&other.best) > cost + LEAST_COST
                         || (plain.best.model().spread == without && !do_faults_explain(search, &other.best, above)) =>
                 {
-                    search.estimator.restore(after);
+                    search.estimator.restore(after.0);
+                    search.split = after.1;
                     search.set_unexplained(&start);
                     plain
                 }
@@ -117,7 +119,8 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
     causes.best = search.settle(best)?;
     if follows_single_runs(search, &causes.best, calibrated)? {
         (search.progress)("causes by names only");
-        search.estimator.restore(before);
+        search.estimator.restore(before.0);
+        search.split = before.1;
         search.phase = Phase::ByNames;
         return find(search, calibrated, is_insufficient);
     }
