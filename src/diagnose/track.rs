@@ -61,7 +61,10 @@ pub(super) fn track(
     let (mut before, mut after): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
     let mut sampled = None;
     let mut tracks = Vec::with_capacity(times.len() * markers.len());
-    let (parts, mut part_volts) = (chain.parts(), vec![0.0; n]);
+    let (is_divided, mut part_volts) = (chain.parts() > 1, vec![0.0; n]);
+    // Commanded at the beginning and the end of a step.
+    let [mut first, mut last] = [vec![0.0; n], vec![0.0; n]];
+    drive.voltages(0.0, &mut last);
     let (mut step, mut next) = (0_u64, 0);
     while next < times.len() {
         let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
@@ -80,6 +83,13 @@ pub(super) fn track(
                 break;
             }
         }
+        let parts = if is_divided {
+            std::mem::swap(&mut first, &mut last);
+            drive.voltages(to, &mut last);
+            chain.parts_between(h, &first, &last)
+        } else {
+            1
+        };
         if parts == 1 {
             means.over(from, to, &mut volts);
             chain.pass(h, &mut volts);

@@ -15,6 +15,12 @@ pub trait SignalStage: Send {
         1
     }
 
+    /// Number of parts, at most [`parts`](Self::parts), that a step of `dt` (s) needs in which the commanded voltages (V, one per actuator) go `from` some
+    /// `to` others.
+    fn parts_between(&self, _dt: f64, _from: &[f64], _to: &[f64]) -> usize {
+        self.parts()
+    }
+
     /// The state as numbers, for checkpoints.
     fn memory(&self) -> Vec<f64> {
         Vec::new()
@@ -64,6 +70,11 @@ impl SignalChain {
     /// Number of parts into which a step is divided if the voltage may jump within it.
     pub fn parts(&self) -> usize {
         self.stages.iter().map(|stage| stage.parts()).max().unwrap_or(1)
+    }
+
+    /// Number of parts that a step of `dt` (s) needs in which the commanded voltages go `from` some `to` others (V, one per actuator).
+    pub fn parts_between(&self, dt: f64, from: &[f64], to: &[f64]) -> usize {
+        self.stages.iter().map(|stage| stage.parts_between(dt, from, to)).max().unwrap_or(1)
     }
 
     /// The state of all stages as numbers, for checkpoints.

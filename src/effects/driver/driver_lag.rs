@@ -103,7 +103,7 @@ impl Lag {
 }
 
 impl Law for Lag {
-    fn follow(&self, dt: f64, state: &mut [f64], volts: &mut [f64]) {
+    fn follow(&self, dt: f64, _since: f64, state: &mut [f64], volts: &mut [f64]) {
         // 1 − exp(−dt/T), and its mean over the step.
         let relaxed = |ratio: f64| {
             let time = ratio * self.time;

@@ -11,6 +11,9 @@ pub(in crate::effects) struct Lags {
     /// q_j (V), elements × actuators.
     behind: Vec<f64>,
     actuators: usize,
+    /// The last step (s), and of every element 1 − e^(−Δt/T_j) and the mean of e^(−t/T_j) over it.
+    step: f64,
+    decays: Vec<[f64; 2]>,
 }
 
 impl Lags {
@@ -26,7 +29,20 @@ impl Lags {
     }
 
     fn with_gain(gain: f64, elements: Vec<[f64; 2]>, actuators: usize) -> Self {
-        Self { gain, behind: vec![0.0; elements.len() * actuators], elements, actuators }
+        let decays = vec![[0.0, 1.0]; elements.len()];
+        Self { gain, behind: vec![0.0; elements.len() * actuators], elements, actuators, step: 0.0, decays }
+    }
+
+    fn set_step(&mut self, dt: f64) {
+        if dt == self.step {
+            return;
+        }
+        self.step = dt;
+        for ([time, _], decay) in self.elements.iter().zip(&mut self.decays) {
+            let steps = dt / time;
+            let gone = -(-steps).exp_m1();
+            *decay = [gone, gone / steps];
+        }
     }
 }
 
@@ -37,13 +53,13 @@ impl SignalStage for Lags {
     }
 
     fn pass(&mut self, dt: f64, volts: &mut [f64]) {
+        self.set_step(dt);
         for (i, volts) in volts.iter_mut().enumerate() {
             let mut away = 0.0;
-            for ([time, weight], q) in self.elements.iter().zip(self.behind.chunks_exact_mut(self.actuators)) {
-                let steps = dt / time;
-                let gone = -(-steps).exp_m1();
+            let elements = self.elements.iter().zip(&self.decays);
+            for (([_, weight], [gone, mean]), q) in elements.zip(self.behind.chunks_exact_mut(self.actuators)) {
                 let before = q[i] - *volts;
-                away += weight * before * gone / steps;
+                away += weight * before * mean;
                 q[i] = *volts + before * (1.0 - gone);
             }
             *volts = self.gain * *volts + away;
