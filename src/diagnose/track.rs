@@ -62,9 +62,7 @@ pub(super) fn track(
     let mut sampled = None;
     let mut tracks = Vec::with_capacity(times.len() * markers.len());
     let (is_divided, mut part_volts) = (chain.parts() > 1, vec![0.0; n]);
-    // Commanded at the beginning and the end of a step, and at the end of the next one.
     let mut commanded = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-    [0.0, h].iter().zip(&mut commanded[1..]).for_each(|(t, volts)| drive.voltages(*t, volts));
     let (mut step, mut next) = (0_u64, 0);
     while next < times.len() {
         let (from, to) = (step as f64 * h, (step + 1) as f64 * h);
@@ -84,10 +82,8 @@ pub(super) fn track(
             }
         }
         let parts = if is_divided {
-            commanded.rotate_left(1);
-            drive.voltages(to + h, &mut commanded[2]);
-            // A jump at the next step's beginning starts a ramp from the middle of the part before.
-            commanded.windows(2).map(|ends| chain.parts_between(h, &ends[0], &ends[1])).max().unwrap_or(1)
+            drive.ahead(step, h, &mut commanded);
+            chain.parts_of_step(h, &commanded)
         } else {
             1
         };

@@ -107,6 +107,11 @@ impl Drive {
         Self { delay, ..self }
     }
 
+    /// Writes the voltages (V) at the beginning of a step of `h` (s), at its end and at the end of the next one to `out`.
+    pub(crate) fn ahead(&self, step: u64, h: f64, out: &mut [Vec<f64>; 3]) {
+        (step..).zip(out).for_each(|(step, volts)| self.voltages(step as f64 * h, volts));
+    }
+
     /// Writes the voltages (V) that reach the torque law at time `t` (s) to `out`, one per actuator.
     pub fn voltages(&self, t: f64, out: &mut [f64]) {
         let t = if self.delay == 0.0 { t } else { (t - self.delay).max(0.0) };

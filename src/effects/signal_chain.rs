@@ -72,9 +72,11 @@ impl SignalChain {
         self.stages.iter().map(|stage| stage.parts()).max().unwrap_or(1)
     }
 
-    /// Number of parts that a step of `dt` (s) needs in which the commanded voltages go `from` some `to` others (V, one per actuator).
-    pub fn parts_between(&self, dt: f64, from: &[f64], to: &[f64]) -> usize {
-        self.stages.iter().map(|stage| stage.parts_between(dt, from, to)).max().unwrap_or(1)
+    /// Number of parts that a step of `dt` (s) needs, by the voltages that are `commanded` at its beginning, at its end and at the end of the next one (V, one per
+    /// actuator): a jump at the beginning of the next step starts a ramp from the middle of the part before.
+    pub fn parts_of_step(&self, dt: f64, commanded: &[Vec<f64>; 3]) -> usize {
+        let of = |ends: &[Vec<f64>]| self.stages.iter().map(|stage| stage.parts_between(dt, &ends[0], &ends[1])).max();
+        commanded.windows(2).filter_map(of).max().unwrap_or(1)
     }
 
     /// The state of all stages as numbers, for checkpoints.

@@ -35,9 +35,14 @@ impl Engine for AffectedEngine {
         self.chain.parts()
     }
 
+    fn parts_of_step(&self, commanded: &[Vec<f64>; 3]) -> usize {
+        self.chain.parts_of_step(self.time_step, commanded)
+    }
+
     /// Each part passes the chain on its own; the engine gets the mean of the outputs.
     fn prepare_parts(&mut self, means: &[f64]) -> Result<(), EngineError> {
-        let (parts, actuators) = (self.chain.parts(), self.actuators());
+        let actuators = self.actuators();
+        let parts = (means.len() / actuators).max(1);
         EngineError::unless_voltages(means.len(), parts * actuators)?;
         self.voltages.clear();
         self.voltages.resize(actuators, 0.0);

@@ -259,12 +259,17 @@ pub trait Engine: Send {
     /// [`EngineError::NotFinite`] if a joint's angle or rate is not a number, [`EngineError::Voltages`] for too many or too few.
     fn prepare(&mut self, voltages: &[f64]) -> Result<(), EngineError>;
 
-    /// Number of equal parts of a step for which [`prepare_parts`](Self::prepare_parts) wants mean voltages, in steps with a jump of voltage.
+    /// Largest number of equal parts of a step for which [`prepare_parts`](Self::prepare_parts) wants mean voltages.
     fn parts(&self) -> usize {
         1
     }
 
-    /// Takes the mean voltages (V) over [`parts`](Self::parts) equal parts of the coming step: parts × actuators values.
+    /// That number for the coming step, by the voltages that are `commanded` at its beginning, at its end and at the end of the next one (V, one per actuator).
+    fn parts_of_step(&self, _commanded: &[Vec<f64>; 3]) -> usize {
+        self.parts()
+    }
+
+    /// Takes the mean voltages (V) over equal parts of the coming step: parts × actuators values.
     ///
     /// # Errors
     /// As [`prepare`](Self::prepare).

@@ -160,9 +160,11 @@ pub(crate) struct Supply<'a> {
     voltages: Vec<f64>,
     /// True of an engine that works at the middle of steps.
     midpoint: bool,
-    /// Parts into which a step is cut for the engine, and their voltages.
+    /// Most parts into which a step is cut for the engine, and their voltages.
     parts: usize,
     pieces: Vec<f64>,
+    /// Voltages commanded at the beginning of a step, at its end and at the end of the next one.
+    commanded: [Vec<f64>; 3],
 }
 
 impl<'a> Supply<'a> {
@@ -181,6 +183,7 @@ impl<'a> Supply<'a> {
             midpoint: engine.midpoint(),
             parts,
             pieces: vec![0.0; parts * actuators],
+            commanded: [vec![0.0; actuators], vec![0.0; actuators], vec![0.0; actuators]],
         }
     }
 
@@ -196,15 +199,22 @@ impl<'a> Supply<'a> {
             return self.prepare_at(engine, step.saturating_sub(1) as f64 * time_step);
         }
         let from = step as f64 * time_step;
-        if self.parts == 1 {
+        let parts = if self.parts == 1 {
+            1
+        } else {
+            self.means.drive().ahead(step, time_step, &mut self.commanded);
+            engine.parts_of_step(&self.commanded)
+        };
+        if parts == 1 {
             self.means.over(from, (step + 1) as f64 * time_step, &mut self.voltages);
             return engine.prepare(&self.voltages);
         }
-        let at = |part: usize| from + time_step * part as f64 / self.parts as f64;
-        for (part, piece) in self.pieces.chunks_exact_mut(self.voltages.len()).enumerate() {
+        let at = |part: usize| from + time_step * part as f64 / parts as f64;
+        let pieces = &mut self.pieces[..parts * self.voltages.len()];
+        for (part, piece) in pieces.chunks_exact_mut(self.voltages.len()).enumerate() {
             self.means.over(at(part), at(part + 1), piece);
         }
-        engine.prepare_parts(&self.pieces)
+        engine.prepare_parts(pieces)
     }
 
     /// Gives the engine the voltages of a step within which none jumps.
