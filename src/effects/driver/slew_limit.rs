@@ -148,7 +148,7 @@ fn approached(x: f64, s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::SignalStage;
+    use crate::effects::{Applied, SignalChain, SignalStage};
 
     #[test]
     fn a_soft_limit_is_a_ramp_far_away_and_a_lag_close_by() {
@@ -189,16 +189,16 @@ mod tests {
 
     #[test]
     fn steps_are_divided_where_the_voltage_bends_within_them_and_nowhere_else() {
-        // Up and down by 300 V at 7.3 ms and 43.9 ms, in steps of 0.25 ms.
+        // Up and down by 300 V at 7.26 ms, in the first part of a step of 0.25 ms, and at 43.9 ms.
         let (dt, steps) = (2.5e-4, 400);
-        let command = |t: f64| if (0.0073..0.0439).contains(&t) { 300.0 } else { 0.0 };
+        let command = |t: f64| if (0.00726..0.0439).contains(&t) { 300.0 } else { 0.0 };
         let mean = |from: f64, to: f64| {
-            let jump = [0.0073, 0.0439].into_iter().find(|jump| (from..to).contains(jump));
+            let jump = [0.00726, 0.0439].into_iter().find(|jump| (from..to).contains(jump));
             jump.map_or(command(from), |jump| (command(from) * (jump - from) + command(to) * (to - jump)) / (to - from))
         };
         // Mean voltages of all steps, and how many steps were divided.
-        let run = |linear: f64, parts: &dyn Fn(&Follower<Slew>, f64) -> usize| {
-            let mut slew = Follower::new(Slew { rate: 4e4, rising: 0.5, linear }, 1);
+        let run = |linear: f64, parts: &dyn Fn(&SignalChain, f64) -> usize| {
+            let mut slew = SignalChain::new(&[Applied { effect: &SLEW_LIMIT, values: vec![4e4, 0.5, linear] }], 1, 0.1);
             let step = |k: u16| {
                 let from = dt * f64::from(k);
                 let n = parts(&slew, from);
@@ -217,10 +217,8 @@ mod tests {
         let (early, largest_error) = (300.0 * 1.5 * dt / 16.0, 4e4 * dt / 16.0 * (1.5 + 1.0 / 8.0));
         for (linear, most) in [(0.0, 6), (3e-4, 80)] {
             let (exact, _) = run(linear, &|_, _| 1024);
-            let (volts, divided) = run(linear, &|slew, t| {
-                let commands = [0.0, 1.0, 2.0].map(|k| [command(t + k * dt)]);
-                slew.parts_between(dt, &commands[0], &commands[1]).max(slew.parts_between(dt, &commands[1], &commands[2]))
-            });
+            let (volts, divided) =
+                run(linear, &|slew, t| slew.parts_of_step(dt, &[0.0, 1.0, 2.0].map(|k| vec![command(t + k * dt)])));
             let apart: Vec<f64> = volts.iter().zip(&exact).map(|(a, b)| a - b).collect();
             let largest = apart.iter().fold(0.0_f64, |most, apart| most.max(apart.abs()));
             let sum = dt * apart.iter().sum::<f64>();
