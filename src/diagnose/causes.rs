@@ -155,8 +155,26 @@ fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Res
     let Naming { best, nearest } = naming::name(search, causes.best.clone())?;
     causes.nearest = nearest;
     let best = search.backward(best)?;
+    let best = with_further_names(search, best, &causes.best)?;
     (causes.best, causes.replaced) = replace(search, best, resolution)?;
     Ok(())
+}
+
+/// The model `named` with further causes where it leaves what one would see, if with these it costs no more than the model with free forms did, or hardly more: a free form
+/// may do the work of several causes. What a law of another form leaves is parcelled out at a higher cost.
+fn with_further_names(search: &mut Search, named: Scored, open: &Scored) -> Result<Scored, DiagnoseError> {
+    if has_free_forms(search, &named) || search.above(&named) <= VISIBLE {
+        return Ok(named);
+    }
+    (search.progress)("further causes beside the names");
+    let before = (search.estimator.state(), search.split.clone());
+    let (further, _) = search.forward(named.clone())?;
+    if further.freedom() > named.freedom() && search.cost(&further) <= search.cost(open) + search.tolerance() {
+        return search.backward(further);
+    }
+    search.estimator.restore(before.0);
+    search.split = before.1;
+    Ok(named)
 }
 
 /// Forward selection, backward elimination and replacement; no causes where the data are insufficient.
@@ -383,7 +401,7 @@ fn is_better(search: &Search, Replacement { removed, trial, .. }: &Replacement, 
 mod tests {
     use super::*;
     use crate::diagnose::plant::Term;
-    use crate::diagnose::waves::{Waves, search};
+    use crate::diagnose::waves::{Waves, candidate, search};
 
     #[test]
     fn a_free_form_that_follows_single_runs_gives_way_to_names() {
@@ -406,11 +424,34 @@ mod tests {
     fn names_only_leave_free_forms_out() {
         let mut plant = Waves::new(&[("other", 1.0)]);
         plant.candidates[0].is_free_form = true;
-        for (phase, count) in [(Phase::Plain, 1), (Phase::ByNames, 0)] {
+        for (phase, count) in [(Phase::Plain, 1), (Phase::Naming, 0), (Phase::ByNames, 0)] {
             let mut search = search(&plant);
             search.phase = phase;
             let calibrated = search.calibrated(1.0).unwrap();
             assert_eq!(search.forward(calibrated).unwrap().0.model().terms.len(), count);
+        }
+    }
+
+    #[test]
+    fn further_causes_stand_beside_names_if_all_are_as_good_as_the_free_form_was() {
+        // The free form does what the name and `late` do, of which 2 per value are left without a candidate; `first` would take 0.5 then.
+        for (is_known, found) in [(true, vec![1, 2, 3]), (false, vec![1])] {
+            let mut plant = Waves::new(&[("other", 15.0), ("late", 2.0), ("first", 1.0)]);
+            let free = Candidate { id: "late", is_free_form: true, is_variant: false, ..plant.candidates[3].clone() };
+            plant.candidates = vec![free, candidate("name"), candidate("first")];
+            plant.candidates.extend(is_known.then(|| candidate("late")));
+            let mut search = search(&plant);
+            // A zero and a drift of each run would follow the slow wave.
+            search.estimator.held_spread = Some(search.estimator.given_spread());
+            let constants = search.calibrated(1.0).unwrap();
+            search.set_unexplained(&constants);
+            search.enter(Phase::Naming);
+            let fitted = |candidate, x| search.fitted(&Model::new(vec![Term { candidate, x }], 1.0, false)).unwrap();
+            let (open, named) = (fitted(0, vec![1.0, 1.0]), fitted(1, vec![1.0]));
+            let model = with_further_names(&mut search, named, &open).unwrap();
+            let mut causes: Vec<usize> = model.model().terms.iter().map(|term| term.candidate).collect();
+            causes.sort_unstable();
+            assert_eq!(causes, found);
         }
     }
 

@@ -174,8 +174,8 @@ impl Search<'_> {
     fn trials(&self, from: &Scored) -> Result<(Vec<Trial>, Screened), DiagnoseError> {
         (self.progress)("screening all candidates");
         // Other laws of a cause are tried once it is adopted.
-        let screened = self
-            .screen_of(from, |candidate| !(candidate.is_variant || (candidate.is_free_form && self.phase == Phase::ByNames)))?;
+        let is_by_names = matches!(self.phase, Phase::Naming | Phase::ByNames);
+        let screened = self.screen_of(from, |candidate| !(candidate.is_variant || (candidate.is_free_form && is_by_names)))?;
         let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
         let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
         let most_free = free.first().map_or(0.0, |(gain, _)| *gain);

@@ -189,7 +189,8 @@ impl<'a> Place<'a> {
     /// ones of `tried`, then those that would take most together. They may be of other places, as what a free form takes need not be of its place alone. Models that
     /// cannot be simulated are none.
     fn several(&self, tried: &[Attempt]) -> Option<Attempt> {
-        if self.search.is_sought(&self.best) || !self.search.may_go_on() {
+        let is_much_left = self.search.share_left(&self.best) > SOUGHT && self.search.above(&self.best) > VISIBLE;
+        if is_much_left || !self.search.may_go_on() {
             return None;
         }
         let mut firsts: Vec<&Attempt> = Vec::new();
@@ -366,6 +367,22 @@ mod tests {
             let named = search.backward(named).unwrap();
             let causes: Vec<usize> = named.model().terms.iter().map(|term| term.candidate).filter(|c| *c > 0).collect();
             assert_eq!(causes, [found], "{hidden}");
+        }
+    }
+
+    #[test]
+    fn several_names_stand_unless_much_is_left_with_the_free_form() {
+        // Of 114 per value the first name takes 112 and both all that the free form does, which leaves 0.5 or 8 % of all.
+        for (left, names) in [(1.0, 2), (4.5, 1)] {
+            let plant = &mut Waves::new(&[("other", 15.0), ("late", 2.0), ("first", left)]);
+            let free = Candidate { id: "late", is_free_form: true, is_variant: false, ..plant.candidates[3].clone() };
+            plant.candidates = vec![free, candidate("name"), candidate("late")];
+            let mut search = search(plant);
+            search.set_unexplained(&search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap());
+            let open = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![1.0, 1.0] }], 1.0, false)).unwrap();
+            let named = name(&mut search, open).unwrap().best;
+            let causes: Vec<usize> = named.model().terms.iter().map(|term| term.candidate).collect();
+            assert_eq!(causes, [1, 2][..names], "{left}");
         }
     }
 

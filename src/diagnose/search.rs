@@ -121,7 +121,7 @@ pub struct Search<'a> {
     pub unexplained: f64,
     /// Models with two causes that cost more are given up; infinite for none.
     pub limit: f64,
-    /// The phase that is under way; no free form is a candidate in that by names only.
+    /// The phase that is under way; no free form is a candidate in those by names.
     pub(super) phase: Phase,
     /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
