@@ -62,8 +62,8 @@ fn push(
         .map(of_kept)
         .filter(|start| effect.shape.is_none() || start.iter().enumerate().any(|(at, x)| !off(at) || *x != 0.0))
         .collect();
-    let ranges = effect.parameters.iter().filter_map(|p| Some((p.name, visited.given(p.name)?)));
-    let given: Vec<(&'static str, f64)> = if effect.shape.is_some() { ranges.collect() } else { form.given.to_vec() };
+    let of_data = effect.parameters.iter().filter_map(|p| Some((p.name, visited.given(p.name)?)));
+    let given: Vec<(&'static str, f64)> = form.given.iter().copied().chain(of_data).collect();
     let is_of_one_actuator =
         effect.parameters.iter().any(|p| p.name == "actuator" && p.default.is_none()) && fitted("actuator").is_none();
     let actuators = if is_of_one_actuator { 1..=bench.actuators } else { 0..=0 };
@@ -99,7 +99,15 @@ mod tests {
         slip_speed: 100.0,
         coordinate: 50.0,
         axes: [true; 2],
+        longest: 10.0,
     };
+
+    #[test]
+    fn creep_has_the_same_time_constants_in_runs_of_all_lengths() {
+        let all = candidates(&BENCH, &VISITED);
+        let mut creeps = all.iter().filter(|candidate| candidate.id == "creep").peekable();
+        assert!(creeps.peek().is_some() && creeps.all(|creep| creep.fixed.contains(&("slowest_s", 3.0 * VISITED.longest))));
+    }
 
     #[test]
     fn every_effect_is_a_candidate_or_excluded_for_a_reason() {

@@ -42,7 +42,7 @@ pub(super) struct Judged {
 }
 
 /// Judges `best` against `bare`, the refined nominal model: the misfit left, the need of refinement, and the intervals of the causes. `open` is what
-/// the model with free forms left (χ² per value above 1): what a name leaves beyond that is known to belong to its place.
+/// the model with free forms left (χ² per value above 1), or the one with constants alone: what a name leaves beyond the former is known to belong to its place.
 ///
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.

@@ -1,4 +1,4 @@
-//! The ranges of voltage, curvature and rate that the data visit: free forms are curves over them.
+//! The ranges of voltage, curvature and rate that the data visit: free forms are curves over them. And for how long: a memory has the same time constants in all runs.
 
 use rayon::prelude::*;
 
@@ -11,6 +11,8 @@ use crate::model::{Mount, Robot, VISCOUS_REACH};
 
 /// A range that is not visited is taken for this (1/m, 1/(m·s), mN·m, mm/s).
 const LEAST: f64 = 1e-3;
+/// The slowest time constant of a memory, in lengths of the longest run: by that a step's response is linear in time during a run, and slower ones do the same.
+const TIMES_LONGEST: f64 = 3.0;
 
 /// What the data visit.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +33,8 @@ pub(super) struct Visited {
     pub(super) coordinate: f64,
     /// Whether x and z are measured.
     pub(super) axes: [bool; 2],
+    /// The longest run (s).
+    pub(super) longest: f64,
 }
 
 impl Visited {
@@ -44,9 +48,10 @@ impl Visited {
         slip_speed: 1.0,
         coordinate: 1.0,
         axes: [true; 2],
+        longest: 0.0,
     };
 
-    /// The range of a free form by the name of its parameter; none of other parameters.
+    /// What the data give of an effect by the name of its parameter, as the range of a free form; none of other parameters.
     pub(super) fn given(&self, name: &str) -> Option<f64> {
         match name {
             "low_v" => Some(self.volts[0]),
@@ -59,6 +64,7 @@ impl Visited {
             "range_mm_s" => Some(self.slip_speed),
             "range_mm" => Some(self.coordinate),
             "range_mn_m" => Some(self.root_moment),
+            "slowest_s" => Some(TIMES_LONGEST * self.longest),
             _ => None,
         }
     }
@@ -103,7 +109,8 @@ pub(super) fn visited(runs: &[Visit]) -> Result<Visited, EngineError> {
         most = [0, 1, 2, 3, 4].map(|k| f64::max(most[k], in_units[k] * of_run[k]));
     }
     let [curvature, rate, root_moment, slip_speed, bend] = most;
-    Ok(Visited { volts, curvature, bend, rate, root_moment, slip_speed, ..Visited::NOTHING })
+    let longest = runs.iter().map(|run| run.step * run.steps as f64).fold(0.0, f64::max);
+    Ok(Visited { volts, curvature, bend, rate, root_moment, slip_speed, longest, ..Visited::NOTHING })
 }
 
 /// Largest elastic curvature of a joint (1/cm), largest rate of curvature (1/(cm·s)), largest moment on the root (dyn·cm), largest slip speed (cm/s) and

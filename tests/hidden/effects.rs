@@ -222,7 +222,8 @@ pub fn set(id: &str, value: f64, nature: &mut Nature, random: &mut Random) -> Ve
         }
         "creep" => {
             nature.creep = value;
-            return vec![("per_decade", growth(value))];
+            // Two branches in a decade.
+            return vec![("per_decade", 2.0 * value)];
         }
         "field-dependent-gain" => {
             nature.slope_per_v = 1e-3 * value;
@@ -274,16 +275,6 @@ pub fn loop_width(share: f64) -> f64 {
         up = (0..=1500).rev().map(|v| plays.follow(-f64::from(v))).collect();
     }
     down.iter().zip(up.iter().rev()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / 1500.0
-}
-
-/// Growth of the answer to a step between 0.3 and 3 s, over the answer at 0.1 s.
-fn growth(share: f64) -> f64 {
-    let answer = |t: f64| {
-        let mut creep = Creep::new(share, 0.0);
-        creep.follow(1.0, 0.0);
-        creep.follow(1.0, t)
-    };
-    (answer(3.0) - answer(0.3)) / answer(0.1)
 }
 
 /// An offset of a given length in a direction drawn.

@@ -5,13 +5,14 @@
 //! ```
 //!
 //! The elements are a Kelvin-Voigt chain. T_max is three times the run's length unless it is given, so runs of different lengths have the same
-//! elements only where it is; a run that continues from a saved state keeps the elements of that state.
+//! elements only where it is; a run that continues from a saved state keeps the elements of that state. A diagnosis gives all runs of a data set three times
+//! the longest one's length: elements that only some runs have would differ by their part of the first voltage, which they hold from before the run.
 //!
 //! With p = 0 the response to a step grows by the share c per decade of time beyond T_0, with another p by a power law of time. r is the number of elements per
 //! decade; r = 0 is a single element of the weight c.
 //!
 //! # Parameters
-//! * `per_decade` (1/decade): growth c of the step response in the decade about 1 s
+//! * `per_decade` (1/decade): growth c of the step response in the decade about 1 s, as a share of the immediate response
 //! * `power` (–): exponent p
 //! * `rungs_per_decade` (–): r; 0 is a single element of the weight c
 //! * `fastest_s` (s): time constant T_0 of the first element
@@ -36,7 +37,7 @@ pub const CREEP: Effect = Effect {
             bounds: [0.0, 1.0],
             off: Some(0.0),
             default: None,
-            about: "growth c of the step response in the decade about 1 s",
+            about: "growth c of the step response in the decade about 1 s, as a share of the immediate response",
         },
         Parameter { name: "power", unit: "", bounds: [-1.0, 1.0], off: None, default: Some(0.0), about: "exponent p" },
         Parameter {
