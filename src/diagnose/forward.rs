@@ -32,7 +32,10 @@ impl Search<'_> {
             let (trials, screened) = self.trials(&best)?;
             let worthy = match self.top(&trials) {
                 Some(top) if self.is_worth(&top, &best) => Some(top),
-                top => self.shown_otherwise(top, &mut best, &trials).or_else(|| self.both(&screened, &best)),
+                top => {
+                    let large = top.clone().filter(|top| self.takes_more_than_it_leaves(top, &best));
+                    self.shown_otherwise(top, &mut best, &trials).or(large).or_else(|| self.both(&screened, &best))
+                }
             };
             let settled = worthy.and_then(|worthy| {
                 (self.progress)(&self.adopting(&worthy, &best));
@@ -275,6 +278,11 @@ impl Search<'_> {
         self.settled_if(trial, |search, settled| search.is_worth(settled, base))
     }
 
+    /// True if a trial takes more than it leaves: that cannot stand for it, though on the select runs, which have to show it too, it may be so much that all could be chance.
+    fn takes_more_than_it_leaves(&self, trial: &Scored, base: &Scored) -> bool {
+        self.takes_much(trial, base) && self.above(base) > 2.0 * self.above(trial)
+    }
+
     /// A cause, or a free form, that shows in fit runs only: where the run that it improves most is selected on as well, the cause, fitted to the others, has to improve it
     /// too. In the place of a free form a name counts as in [`top`](Self::top). If it does, that run counts in the fit again unless the other select runs are
     /// predicted worse so: it may be the one that shows how large the cause is, or what its law does not follow.
@@ -440,6 +448,22 @@ mod tests {
             assert_eq!(found.model().terms[0].candidate, adopted, "{other}");
             // Only the cause on another split may leave that behind.
             assert!(adopted == 1 || search.split.select == own);
+        }
+    }
+
+    #[test]
+    fn a_cause_that_takes_more_than_it_leaves_is_adopted_though_that_may_be_chance() {
+        // The cause takes 4.5 per value; 3 or 8 are left, which follow it for half a period in each block.
+        for (late, count) in [(2.5, 1), (4.0, 0)] {
+            let mut plant = Waves::new(&[("other", 3.0), ("late", late)]);
+            plant.candidates.truncate(1);
+            let mut search = search(&plant);
+            search.estimator.held_spread = Some(search.estimator.given_spread());
+            (search.split.fit, search.split.select) = (vec![1, 2], vec![0]);
+            let plain = search.calibrated(1.0).unwrap();
+            let cause = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![1.0] }], 1.0, false)).unwrap();
+            assert!(!search.is_worth(&cause, &plain), "{late}");
+            assert_eq!(search.forward(plain).unwrap().0.model().terms.len(), count, "{late}");
         }
     }
 

@@ -3,7 +3,7 @@
 use super::Hidden;
 use super::chain::BRANCHES;
 use super::forms::Other;
-use super::protocol::{Creep, Plays, RUNS};
+use super::protocol::{Plays, RUNS};
 use super::random::Random;
 
 /// Number of play operators of the hysteresis; their radii go up to 1500 V.
