@@ -126,17 +126,15 @@ pub(super) fn adopted(
         let coarse = Unseen::of(search, &judged.coarse, &needs, &tuned)?;
         effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
     }
-    let first = effects.len();
-    let count = search.estimator.count(&search.split.all()) as f64;
-    let mut taken: Vec<f64> =
-        weighed.iter().map(|weighed| (search.chi2(&weighed.without) - search.chi2(best)).max(0.0) / count).collect();
-    let whole = Whole::of(search, best, bare, &taken)?;
+    let (whole, mut taken) = (Whole::of(search, best, bare)?, vec![0.0; effects.len()]);
     for (index, Weighed { without, standing, tied_with, .. }) in weighed.iter().enumerate() {
         let mut others = needs.clone();
         others.remove(index);
         let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others, &tuned)?, search);
         let mut effect = effect(search, judged, index, standing, tied_with);
-        effect.share = whole.share(search, best, index, taken[index]);
+        let own = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
+        taken.push(own);
+        effect.share = whole.share(search, best, index, own);
         effect.gain_heldout = gain_heldout;
         if within.contains(&terms[index].candidate) {
             effect.role = Part::Minor;
@@ -147,17 +145,17 @@ pub(super) fn adopted(
         effect.nearest = of_place.map(|(_, tried)| tried.clone()).unwrap_or_default();
         effects.push(effect);
     }
-    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[*index] < MINOR_MISFIT;
+    let first = effects.len() - terms.len();
+    let is_small = |index: &usize| effects[first + index].share <= MINOR_SHARE || taken[first + index] < MINOR_MISFIT;
     let small: Vec<usize> = (0..terms.len()).filter(is_small).collect();
     for Needed { index, own, instead } in needed_together(search, best, &whole, small) {
-        taken[index] = own;
+        taken[first + index] = own;
         let effect = &mut effects[first + index];
         effect.share = whole.share(search, best, index, own);
         let instead: Vec<&str> = instead.iter().map(|other| search.id(terms[*other].candidate)).collect();
         tie_unstable(effect.stability, &mut effect.tied_with, &instead);
     }
     let is_convention = |k: usize| k >= first && search.estimator.plant.is_convention(terms, k - first, search.above(best));
-    let taken: Vec<f64> = vec![0.0; first].into_iter().chain(taken).collect();
     set_roles(&mut effects, &taken, is_convention);
     let pairs = weighed.into_iter().flat_map(|weighed| weighed.pairs).collect();
     Ok(Adoption { effects, unseen, pairs })
@@ -200,28 +198,23 @@ struct Whole {
     bare: f64,
     /// Left by the refined nominal model with re-tuned constants.
     tuned: f64,
-    /// What each term of that model removes.
-    taken: Vec<f64>,
 }
 
 impl Whole {
-    fn of(search: &Search, best: &Scored, bare: &Scored, taken: &[f64]) -> Result<Self, DiagnoseError> {
+    fn of(search: &Search, best: &Scored, bare: &Scored) -> Result<Self, DiagnoseError> {
         let tuned = search.with_constants(&Model { terms: Vec::new(), ..best.model().clone() });
         let tuned = search.fitted_at_its_spread(&tuned)?;
         let count = search.estimator.count(&search.split.all()) as f64;
         let left = |scored: &Scored| ((search.chi2(scored) - search.chi2(best)) / count).max(f64::MIN_POSITIVE);
-        Ok(Self { bare: left(bare), tuned: left(&tuned), taken: taken.to_vec() })
+        Ok(Self { bare: left(bare), tuned: left(&tuned) })
     }
 
     /// The share of term `index`, which removes `own` (χ² per value), of what re-tuned constants leave. Constants among themselves, which leave nothing, share what the
-    /// nominal model leaves; so does one at the place of another cause that removes more, as a gain beside one that depends on the voltage: it may be what that one's law lacks.
+    /// nominal model leaves; so does one at the place of another cause, as a gain beside one that depends on the voltage: it may be what that one's law lacks.
     fn share(&self, search: &Search, best: &Scored, index: usize, own: f64) -> f64 {
         let cause = search.candidate(&best.model().terms[index]);
-        let is_larger_law = |(term, taken): (&Term, &f64)| {
-            let other = search.candidate(term);
-            !other.is_constant && *taken > own && other.places.iter().any(|place| cause.places.contains(place))
-        };
-        let is_at_a_law = best.model().terms.iter().zip(&self.taken).any(is_larger_law);
+        let mut others = best.model().terms.iter().map(|term| search.candidate(term)).filter(|other| !other.is_constant);
+        let is_at_a_law = others.any(|other| other.places.iter().any(|place| cause.places.contains(place)));
         let is_of_bare = cause.is_constant && (is_at_a_law || self.tuned < MINOR_MISFIT);
         (own / if is_of_bare { self.bare } else { self.tuned }).clamp(0.0, 1.0)
     }
@@ -369,19 +362,17 @@ mod tests {
 
     #[test]
     fn a_constant_shares_what_constants_leave_unless_a_law_of_its_place_may_lack_it() {
-        // The wave of the amplitude 3 leaves 3²/2 times the noise, that of 0.1 less than half the noise. A law that removes less than the constant does not lack it.
-        for (place, amplitude, law, is_of_bare) in
-            [("elsewhere", 3.0, 2.0, false), ("test", 3.0, 2.0, true), ("test", 3.0, 0.5, false), ("elsewhere", 0.1, 2.0, true)]
-        {
+        // The wave of the amplitude 3 leaves 3²/2 times the noise, that of 0.1 less than half the noise.
+        for (place, amplitude, is_of_bare) in [("elsewhere", 3.0, false), ("test", 3.0, true), ("elsewhere", 0.1, true)] {
             let mut plant = Waves::new(&[("other", amplitude)]);
             plant.candidates[1].is_constant = true;
             plant.candidates[1].places = vec![place];
             let search = search(&plant);
             let terms = [0, 1].map(|candidate| Term { candidate, x: vec![0.0] });
             let best = search.fitted(&Model::new(terms.to_vec(), 1.0, false)).unwrap();
-            let whole = Whole { bare: 1000.0, ..Whole::of(&search, &best, &best, &[law, 1.0]).unwrap() };
+            let whole = Whole { bare: 1000.0, ..Whole::of(&search, &best, &best).unwrap() };
             let share = whole.share(&search, &best, 1, 1.0);
-            assert_eq!(share, if is_of_bare { 1e-3 } else { 1.0 / whole.tuned }, "{place} {amplitude} {law}");
+            assert_eq!(share, if is_of_bare { 1e-3 } else { 1.0 / whole.tuned }, "{place} {amplitude}");
             assert_eq!(whole.share(&search, &best, 0, 1.0), (1.0 / whole.tuned).min(1.0));
         }
     }
@@ -394,7 +385,7 @@ mod tests {
             let bare = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
             let all = [0, 1, 2].map(|candidate| Term { candidate, x: vec![1.0] });
             let best = search.fitted(&Model::new(all.to_vec(), 1.0, false)).unwrap();
-            let whole = Whole::of(&search, &best, &bare, &[0.0; 3]).unwrap();
+            let whole = Whole::of(&search, &best, &bare).unwrap();
             let found = needed_together(&search, &best, &whole, vec![0, 1, 2]);
             assert_eq!(found.len(), needed, "{found:?}");
             for Needed { index, own, instead } in found {
