@@ -13,6 +13,7 @@ use crate::sweep::submit::{Job, Plan, Scheduler, Submission, SubmitError};
 /// Options of `--submit`.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "On a cluster")]
+#[group(skip)] // its name would be that of the command's own arguments
 pub struct Args {
     /// Compute only every N-th point or data set, beginning with the K-th, and leave the others to other machines; `auto` in a job array of Slurm, PBS, SGE, LSF,
     /// Kubernetes or HyperQueue.
