@@ -377,7 +377,9 @@ mod tests {
     #[test]
     fn a_constant_shares_what_constants_leave_unless_a_law_of_its_place_may_lack_it() {
         // Without causes 12.5 per value are left, without that of the constant's place 4.5; the small waves are less than half the noise.
-        for (place, waves, of_all) in [("elsewhere", [3.0, 4.0], 12.5), ("test", [3.0, 4.0], 4.5), ("elsewhere", [0.1, 0.0], 1000.0)] {
+        for (place, waves, of_all) in
+            [("elsewhere", [3.0, 4.0], 12.5), ("test", [3.0, 4.0], 4.5), ("elsewhere", [0.1, 0.0], 1000.0)]
+        {
             let mut plant = Waves::new(&[("other", waves[0]), ("late", waves[1])]);
             plant.candidates = ["other", "first", "late"].map(candidate).to_vec();
             plant.candidates[1].is_constant = true;
