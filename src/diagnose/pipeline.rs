@@ -174,7 +174,8 @@ struct Decided {
     dropped: Option<Model>,
 }
 
-/// Judges a model, and drops causes whose intervals contain their off values. The model with free forms leaves `open`, the one with constants alone `tuned` (χ² per value above 1).
+/// Judges a model, and drops causes whose intervals contain their off values. The model with free forms leaves `open`, the one with constants alone `tuned` (χ² per value above
+/// 1), which counts where no cause is left.
 fn decide(
     search: &Search,
     best: Scored,
@@ -182,7 +183,9 @@ fn decide(
     [open, tuned]: [f64; 2],
     nominal_resolution: f64,
 ) -> Result<Decided, DiagnoseError> {
-    let mut judged = judge(search, best, bare, open.min(tuned), nominal_resolution)?;
+    let known = |best: &Scored| if search.causes(best) == 0 { tuned } else { f64::INFINITY };
+    let open = open.min(known(&best));
+    let mut judged = judge(search, best, bare, open, nominal_resolution)?;
     let (mut doubts, mut insufficient, mut dropped, remark) = (Vec::new(), None, None, judged.remark.take());
     while let Some((index, words)) = doubtful(search, &judged)? {
         let model = search.without(&judged.best, index)?;
@@ -191,7 +194,9 @@ fn decide(
             insufficient.get_or_insert_with(|| words.clone());
         }
         doubts.push(words);
-        judged = judge(search, search.fitted(&model)?, bare, tuned, nominal_resolution)?;
+        let without = search.fitted(&model)?;
+        let open = known(&without);
+        judged = judge(search, without, bare, open, nominal_resolution)?;
     }
     judged.remark = remark.or(judged.remark);
     Ok(Decided { judged, doubts, insufficient, dropped })
