@@ -28,10 +28,10 @@ impl Phase {
     /// Number of simulations: the slowest set of the tests' simulator takes less than three minutes on two cores with these.
     fn end(self) -> f64 {
         match self {
-            Self::Plain => 5000.0,
-            Self::WithFaults => 7500.0,
-            Self::Naming => 10000.0,
-            Self::ByNames => 12000.0,
+            Self::Plain => 4000.0,
+            Self::WithFaults => 6000.0,
+            Self::Naming => 8000.0,
+            Self::ByNames => 10000.0,
         }
     }
 
