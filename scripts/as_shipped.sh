@@ -3,7 +3,8 @@
 #
 # Recordings are compared as CSV, all digits of them: an NPZ holds the minute of its making.
 #   bash scripts/as_shipped.sh                  the second program is built in target/as-shipped and stays there, for scripts/bench_engines.py too
-#   bash scripts/as_shipped.sh --unoptimised    its own crate is built without optimisation, which changes no bits and saves minutes: for this comparison only
+#   bash scripts/as_shipped.sh --unoptimised    its own crate is built without optimisation, which changes no bits and saves minutes: for this comparison only; the first
+#                                               program is target/release/sfers as it is, and is put back afterwards
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,14 +12,15 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 build() { cargo build --release --locked --bin sfers "$@"; }
-build
-cp target/release/sfers "$folder/own"
 if [ "${1:-}" = --unoptimised ]; then
-  # In the same folder, where all other crates are built already; afterwards the program is itself again.
+  cp target/release/sfers "$folder/own"
+  # In the same folder, where other crates are built already.
   build --features bullet-as-shipped --config 'profile.release.package.sfers-rs.opt-level=0'
-  cp target/release/sfers "$folder/shipped"
-  build
+  mv target/release/sfers "$folder/shipped"
+  cp "$folder/own" target/release/sfers
 else
+  build
+  cp target/release/sfers "$folder/own"
   build --features bullet-as-shipped --target-dir target/as-shipped
   cp target/as-shipped/release/sfers "$folder/shipped"
 fi

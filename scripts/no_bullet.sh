@@ -9,7 +9,7 @@ trap 'rm -rf "$folder"' EXIT
 # expect WORDS: builds bullet-sys with only $folder for pkg-config and looks for WORDS in the error.
 expect() {
   local text
-  if text=$(PKG_CONFIG_PATH='' PKG_CONFIG_LIBDIR="$folder" cargo build --locked -p bullet-sys 2>&1); then
+  if text=$(PKG_CONFIG_PATH='' PKG_CONFIG_LIBDIR="$folder" cargo build --release --locked -p bullet-sys 2>&1); then
     echo "the build succeeded, but should have failed with: $1"
     exit 1
   fi

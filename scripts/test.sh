@@ -33,14 +33,16 @@ step "the Python package: wheel, types, tests, notebooks"
 bash scripts/wheel.sh --test
 
 if $long; then
+  # As the tests have built it: another build would choose other features of a few crates, and take minutes.
+  program=target/release/sfers
   step "shim under ASan, UBSan and TSan"
   bash scripts/sanitize.sh
   step "the shim's rows against Bullet's own"
   bash scripts/as_shipped.sh --unoptimised
   step "one short run under valgrind"
-  bash scripts/valgrind.sh
+  bash scripts/valgrind.sh "$program"
   step "the whole paper"
-  cargo run --release --locked --quiet -- reproduce --quick --out target/paper
+  "$program" reproduce --quick --out target/paper
   step "a build without Bullet names the Debian package"
   bash scripts/no_bullet.sh
 fi

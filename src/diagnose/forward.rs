@@ -6,11 +6,14 @@ use super::DiagnoseError;
 use super::budget::Phase;
 use super::fit::{Convergence, sum_of_squares};
 use super::naming::is_of;
+use super::plant::Candidate;
 use super::search::{LEAST_BIC, LEAST_GAIN, Scored, Screened, Search, Trial, VISIBLE};
 
 /// Candidates that are fitted after screening, named ones and free forms.
 const FINALISTS: usize = 7;
 const FREE_FINALISTS: usize = 3;
+/// Further names that are fitted beside the best one in the place of a free form.
+const FURTHER: usize = 3;
 /// Candidates are fitted whose linear estimate is at least this share of the best one's, and free forms among free forms.
 const PROMISING: f64 = 0.02;
 const PROMISING_FREE: f64 = 0.4;
@@ -64,7 +67,24 @@ impl Search<'_> {
             return first.cloned();
         };
         let rivals = named.iter().enumerate().filter(|(at, named)| *at == 0 || self.is_name_of(free, named));
-        Some(self.or_a_name(free.clone(), rivals.map(|(_, named)| (*named).clone())))
+        let top = self.or_a_name(free.clone(), rivals.map(|(_, named)| (*named).clone()));
+        let one_of_two = first.filter(|name| self.ends_free(top.model()) && self.is_one_of_two(name, free));
+        Some(one_of_two.cloned().unwrap_or(top))
+    }
+
+    /// A name that leaves less with a further one than a free form does, by what one would see: the free form does a part of two causes' work then, and what it cannot do of
+    /// that goes to a third.
+    fn is_one_of_two(&self, name: &Scored, free: &Scored) -> bool {
+        let most = self.above(free) - VISIBLE;
+        if most <= 0.0 {
+            return false;
+        }
+        let is_wanted = |candidate: &Candidate| !(candidate.is_variant || candidate.is_free_form);
+        let Ok(screened) = self.screen_of(name, is_wanted) else { return false };
+        (self.progress)("two names in the place of a free form");
+        let mut two =
+            self.finalists(&screened.ranked, FURTHER).into_iter().filter_map(|model| self.ranked_beyond(&model, &screened).ok());
+        two.any(|two| self.above(&two) < most && self.judged(&two) < self.judged(free))
     }
 
     /// A model that ends with a free form, or the best of `named` with their other laws if the free form is not closer.
@@ -327,7 +347,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::plant::{Candidate, Model, Term};
+    use crate::diagnose::plant::{Model, Term};
     use crate::diagnose::waves::{Waves, candidate, search};
 
     #[test]
@@ -376,6 +396,28 @@ mod tests {
         let mut base = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
         let seen = search.seen_by_fit_runs(&mut base, &trials).unwrap();
         assert_eq!(seen.model().terms[0].candidate, 3);
+    }
+
+    #[test]
+    fn a_name_that_leaves_less_with_a_further_one_is_adopted_in_the_place_of_a_free_form() {
+        // The free form leaves half of the noise, or nothing; the further name all of what the name leaves, or there is none.
+        let both = &[("other", 3.0), ("first", 3.0)][..];
+        for (hidden, names, adopted) in [
+            (both, &["other", "first"][..], "other"),
+            (both, &["other"], "between"),
+            (&[("between", 3.0)], &["other", "first"], "between"),
+        ] {
+            let mut plant = Waves::new(hidden);
+            plant.candidates = names.iter().map(|id| candidate(id)).collect();
+            plant.candidates.push(Candidate { is_free_form: true, ..candidate("between") });
+            let search = search(&plant);
+            let trial = |candidate: usize| {
+                let model = Model::new(vec![Term { candidate, x: vec![1.0] }], 1.0, false);
+                Trial { candidate, scored: search.fitted(&model).unwrap() }
+            };
+            let top = search.top(&[trial(names.len()), trial(0)]).unwrap();
+            assert_eq!(search.id(top.model().terms[0].candidate), adopted, "{hidden:?} {names:?}");
+        }
     }
 
     #[test]

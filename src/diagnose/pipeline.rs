@@ -456,6 +456,24 @@ mod tests {
     }
 
     #[test]
+    fn a_cause_with_several_parameters_is_in_doubt_where_the_data_are_explained_as_well_without_it() {
+        for (amplitude, in_doubt) in [(5.0, false), (0.0, true)] {
+            let mut plant = Waves::new(&[("second", amplitude)]);
+            // A shape, which nothing switches off.
+            plant.candidates[3].parameters[1].off = None;
+            let search = search(&plant);
+            let bare = search.fitted(&Model::new(Vec::new(), 1.0, false)).unwrap();
+            let term = Term { candidate: 3, x: vec![1.0, 1.0] };
+            let best = search.fitted(&Model::new(vec![term], 1.0, false)).unwrap();
+            let mut judged = judge(&search, best, &bare, f64::INFINITY, 1.0).unwrap();
+            // As wide as its shape can make the range of its size.
+            judged.intervals.ends.fill([-1.0, 10.0]);
+            assert!(!judged.is_unexplained);
+            assert_eq!(doubtful(&search, &judged).unwrap().is_some(), in_doubt, "{amplitude}");
+        }
+    }
+
+    #[test]
     fn what_constants_within_the_discretisation_s_error_take_is_not_unexplained() {
         // 0.32 per value come back without the constant, less than `VISIBLE` beyond the 0.08 that nothing takes; nothing takes any of the other wave.
         for (hidden, verdict) in

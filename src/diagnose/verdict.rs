@@ -96,8 +96,8 @@ pub(super) fn judge(
 
 /// A term that the data do not tell from its absence, the least certain one if there are several, with a remark in words.
 ///
-/// The 95 % intervals of all its parameters with an off value contain that value. Several such parameters may compensate each other, so χ² without the
-/// term has to agree.
+/// The 95 % intervals of all its parameters with an off value contain that value. Several parameters may compensate each other, so χ² without the term
+/// has to agree.
 ///
 /// # Errors
 /// [`DiagnoseError`] if a model cannot be simulated.
@@ -123,7 +123,7 @@ pub(super) fn doubtful(search: &Search, judged: &Judged) -> Result<Option<(usize
         let inflation = own.map(|k| intervals.inflation[k]).fold(1.0, f64::max);
         let gain = (without.fitted - best.fitted) / inflation;
         let needed = CHI2_95[(term.x.len() - 1).min(CHI2_95.len() - 1)];
-        if switches.len() > 1 && gain > needed {
+        if term.x.len() > 1 && gain > needed {
             continue;
         }
         let numbers: Vec<String> =

@@ -30,6 +30,7 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
         // Hidden in the first run only.
         "once" if run > 0 => 0.0,
         "late" => (3.0 * t).cos(),
+        "between" => wave("other", run, at) + 0.6 * wave("first", run, at),
         _ => (23.0 * t).cos(),
     }
 }
