@@ -78,10 +78,14 @@ pub fn diagnose(
         decide(&search, causes.best.clone(), &bare, [causes.open, tuned], nominal_resolution)?;
     search.estimator.fit_nuisances(judged.best.model(), &search.split.judge)?;
     let [nominal, calibrated, best] = [nominal, calibrated, judged.best].map(|scored| search.with_judged(scored));
-    let (nominal, calibrated, judged) = (nominal?, calibrated?, Judged { best: best?, ..judged });
+    let (nominal, calibrated, mut judged) = (nominal?, calibrated?, Judged { best: best?, ..judged });
     progress("tied causes");
     let ties = Ties::new(&search, &judged.best, &causes.replaced);
     let Adoption { effects, unseen, pairs } = adopted(&search, &judged, &bare, &causes, &ties)?;
+    // What leaves structure and predicts other runs worse than constants alone is no explanation.
+    let by_constants = Unseen::of(&search, &calibrated, &[], &[])?;
+    let is_no_better = !is_nothing(&effects) && unseen.is_clearly_worse_than(&by_constants, &search);
+    judged.is_unexplained |= is_no_better && judged.left > LEFT_OVER;
     let insufficient = insufficient.or(too_few.filter(|_| is_nothing(&effects)));
     let mut remarks = doubts;
     if spikes > 0 {
@@ -98,6 +102,8 @@ pub fn diagnose(
         causes: &causes,
         ties: &ties,
         unseen,
+        by_constants,
+        is_no_better,
         nominal: &nominal,
         calibrated: &calibrated,
     };
@@ -230,6 +236,10 @@ struct Report<'r, 'a> {
     ties: &'r Ties,
     /// The extended model on the runs that judge it.
     unseen: Unseen,
+    /// The re-tuned nominal model on these runs.
+    by_constants: Unseen,
+    /// True if causes predict these runs clearly worse than re-tuned constants do.
+    is_no_better: bool,
     nominal: &'r Scored,
     calibrated: &'r Scored,
 }
@@ -249,11 +259,9 @@ impl Report<'_, '_> {
         let noise = &search.estimator.noise;
         let bench = faults::found(&search.estimator, best.model())?;
         quality.extend(faults::remarks(&bench.faults, noise, search.estimator.plant));
-        let tuned = Unseen::of(search, self.calibrated, &[], &[])?;
-        let is_no_better = !is_nothing(&effects) && self.unseen.is_clearly_worse_than(&tuned, search);
-        let [baseline, calibrated, extended] = self.stages(&tuned)?;
+        let [baseline, calibrated, extended] = self.stages()?;
         let unit = search.estimator.plant.unit();
-        let unseen = is_no_better.then(|| {
+        let unseen = self.is_no_better.then(|| {
             let [own, tuned] = [&extended, &calibrated].map(|stage| format!("{} {unit}", significant(stage.rmse_heldout_mm, 2)));
             format!("it predicts runs that were left out worse than re-tuned constants do (rms error {own} against {tuned})")
         });
@@ -308,13 +316,13 @@ impl Report<'_, '_> {
         })
     }
 
-    /// The nominal, the re-tuned (on the runs that judge it: `tuned`) and the extended model beside the data.
-    fn stages(&self, tuned: &Unseen) -> Result<[Stage; 3], DiagnoseError> {
-        let Self { search, judged, nominal, calibrated, .. } = self;
+    /// The nominal, the re-tuned and the extended model beside the data.
+    fn stages(&self) -> Result<[Stage; 3], DiagnoseError> {
+        let Self { search, judged, by_constants, nominal, calibrated, .. } = self;
         let constants = intervals_of(search, calibrated, &[])?;
         Ok([
             self.stage(nominal, &Unseen::of(search, nominal, &[], &[])?, Vec::new()),
-            self.stage(calibrated, tuned, self.parameters(calibrated, &constants)),
+            self.stage(calibrated, by_constants, self.parameters(calibrated, &constants)),
             self.stage(&judged.best, &self.unseen, self.parameters(&judged.best, &judged.intervals)),
         ])
     }
@@ -470,6 +478,21 @@ mod tests {
             judged.intervals.ends.fill([-1.0, 10.0]);
             assert!(!judged.is_unexplained);
             assert_eq!(doubtful(&search, &judged).unwrap().is_some(), in_doubt, "{amplitude}");
+        }
+    }
+
+    #[test]
+    fn what_leaves_structure_and_predicts_other_runs_worse_than_constants_is_unexplained() {
+        // Some 0.5 of 32 per value are left; in the runs that judge the cause has the same sign, or the other one.
+        for (sign, verdict) in [(1.0, Verdict::Named), (-1.0, Verdict::Unexplained)] {
+            let mut plant = Waves::with_runs(&[("other", 8.0), ("late", 1.2)], 12);
+            plant.candidates.truncate(1);
+            for run in split(&plant, &[Role::Auto; 12]).judge {
+                plant.signals[run].values.iter_mut().for_each(|value| *value *= sign);
+            }
+            let found = diagnose(&plant, "waves", &[Role::Auto; 12], Vec::new(), &|_| {}, &|_| None).unwrap().diagnosis;
+            assert_eq!((found.verdict, found.effects.len()), (verdict, 1), "{}", found.summary);
+            assert_eq!(found.summary.contains("explains a part"), sign < 0.0, "{}", found.summary);
         }
     }
 

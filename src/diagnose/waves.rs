@@ -8,7 +8,7 @@ use super::split::split;
 
 /// Sums of waves with noise; the candidates `first` and `second` are nearly collinear.
 pub(super) struct Waves {
-    signals: Vec<Signal>,
+    pub(super) signals: Vec<Signal>,
     pub(super) candidates: Vec<Candidate>,
     /// Above 1 they add the wave `other` with an amplitude of what they exceed 1 by.
     pub(super) resolutions: Vec<f64>,
@@ -58,6 +58,10 @@ pub(super) fn candidate(id: &'static str) -> Candidate {
 
 impl Waves {
     pub(super) fn new(of: &[(&str, f64)]) -> Self {
+        Self::with_runs(of, 6)
+    }
+
+    pub(super) fn with_runs(of: &[(&str, f64)], runs: usize) -> Self {
         let signal = |run: usize| {
             let value = |at: usize| {
                 let noise = (1.0 + (run * VALUES + at) as f64).sin() * 43_758.545_3;
@@ -82,7 +86,14 @@ impl Waves {
         variant.parameters.push(Free { name: "y", ..variant.parameters[0] });
         variant.starts = vec![vec![1.0, 1.0]];
         candidates.push(variant);
-        Self { signals: (0..6).map(signal).collect(), candidates, resolutions: vec![1.0], tolerance: 0.0, lateness: 0.0, work: 1 }
+        Self {
+            signals: (0..runs).map(signal).collect(),
+            candidates,
+            resolutions: vec![1.0],
+            tolerance: 0.0,
+            lateness: 0.0,
+            work: 1,
+        }
     }
 }
 
