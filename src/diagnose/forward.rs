@@ -400,7 +400,7 @@ mod tests {
 
     #[test]
     fn a_name_that_leaves_less_with_a_further_one_is_adopted_in_the_place_of_a_free_form() {
-        // The free form leaves half of the noise, or nothing; the further name all of what the name leaves, or there is none.
+        // The free form leaves some 0.5 per value, or nothing; the further name takes all of what the name leaves, or there is none.
         let both = &[("other", 3.0), ("first", 3.0)][..];
         for (hidden, names, adopted) in [
             (both, &["other", "first"][..], "other"),
