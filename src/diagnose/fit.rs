@@ -90,10 +90,21 @@ impl Linearised {
         Self { residuals, derivatives, chi2, gradient, information, is_by_differences }
     }
 
+    /// What half the gradient of χ² is at the end of a step beyond what the derivatives promise.
+    fn bend(&self, step: &Step) -> DVector<f64> {
+        let after = DVector::from_iterator(step.by.len(), self.derivatives.iter().map(|column| dot(column, &step.residuals)));
+        after - &self.gradient - &self.information * &step.by
+    }
+
+    /// Size of a step, in units of what each coordinate does.
+    fn size(&self, by: &DVector<f64>) -> f64 {
+        by.iter().enumerate().map(|(k, by)| self.information[(k, k)] * by * by).sum()
+    }
+
     /// Moves to the end of a step: the least change of the derivatives, in units of what they do, that gives the residuals there (Broyden 1965).
     fn follow(&mut self, step: Step) {
         let weighted: Vec<f64> = step.by.iter().enumerate().map(|(k, by)| self.information[(k, k)] * by).collect();
-        let size: f64 = step.by.iter().zip(&weighted).map(|(by, weighted)| by * weighted).sum();
+        let size = self.size(&step.by);
         for (run, after) in step.residuals.iter().enumerate() {
             for (value, after) in after.iter().enumerate() {
                 let promised: f64 = self.derivatives.iter().zip(step.by.iter()).map(|(column, by)| column[run][value] * by).sum();
@@ -414,6 +425,9 @@ impl<'a> Estimator<'a> {
 
     /// The first of the steps of Levenberg and Marquardt, with more and more damping `lambda`, that lowers χ²; only one step where the derivatives are
     /// not by differences. Coordinates at a bound with the gradient pointing outwards are held.
+    ///
+    /// Where a step does not lower χ², one is tried that follows the curve of the residuals along it, as far as one step tells: in a curved valley all straight steps
+    /// have to be short (the geodesic acceleration of Transtrum and Sethna, arXiv:1201.5885, with a difference over the whole step).
     fn step_down(
         &self,
         model: &Model,
@@ -422,55 +436,79 @@ impl<'a> Estimator<'a> {
         fixed: Option<(usize, usize)>,
         lambda: &mut f64,
     ) -> Option<Step> {
-        let coordinates = coordinates(model);
-        let n = coordinates.len();
-        if n == 0 {
-            return None;
-        }
-        let bounds = |k: usize| {
-            let (term, parameter) = coordinates[k];
-            self.plant.candidates()[model.terms[term].candidate].parameters[parameter].bounds
-        };
-        let x = |k: usize| model.terms[coordinates[k].0].x[coordinates[k].1];
         let Linearised { information, gradient, .. } = here;
-        let is_held = |k: usize| {
-            let [low, high] = bounds(k);
-            let leads_out = (x(k) <= low && gradient[k] > 0.0) || (x(k) >= high && gradient[k] < 0.0);
-            Some(coordinates[k]) == fixed || leads_out || information[(k, k)] <= 0.0
+        let n = gradient.len();
+        let held = self.held(model, here, fixed);
+        let step = |by: &DVector<f64>| {
+            let (model, by) = self.moved_by(model, by);
+            let residuals = self.residuals_of(&model, runs).ok()?;
+            let chi2 = residuals.iter().map(|r| sum_of_squares(r)).sum();
+            let promised = -2.0 * gradient.dot(&by) - by.dot(&(information * &by));
+            Some(Step { model, by, residuals, chi2, promised })
         };
-        let held: Vec<bool> = (0..n).map(is_held).collect();
-        loop {
+        while n > 0 && *lambda <= 1e6 {
             let damped = |i: usize, j: usize| match i == j {
                 true if held[i] => 1.0,
                 true => information[(i, i)] + *lambda * information[(i, i)].max(1e-12),
                 false if held[i] || held[j] => 0.0,
                 false => information[(i, j)],
             };
-            let right = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] });
-            let by = DMatrix::from_fn(n, n, damped).lu().solve(&right)?;
-            let mut trial = model.clone();
-            for (k, (term, parameter)) in coordinates.iter().enumerate() {
-                let [low, high] = bounds(k);
-                let slot = &mut trial.terms[*term].x[*parameter];
-                *slot = (*slot + by[k]).clamp(low, high);
+            let factors = DMatrix::from_fn(n, n, damped).lu();
+            let against =
+                |gradient: &DVector<f64>| factors.solve(&DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] }));
+            let straight = step(&against(gradient)?);
+            let curved = |straight: &Step| {
+                let aside = against(&here.bend(straight)).filter(|aside| here.size(aside) < here.size(&straight.by))?;
+                // Nothing is promised for what the derivatives do not tell: they are taken anew at its end.
+                Some(Step { promised: f64::INFINITY, ..step(&(&straight.by + aside))? })
+            };
+            let is_lower = |step: &Step| step.chi2 < here.chi2;
+            let is_still = straight.as_ref().is_some_and(|straight| straight.model == *model);
+            let is_last = is_still || !here.is_by_differences;
+            let lower = match straight {
+                Some(straight) if !is_lower(&straight) && !is_last => curved(&straight).filter(is_lower),
+                straight => straight.filter(is_lower),
+            };
+            if lower.is_some() {
+                *lambda = (*lambda * 0.1).max(1e-9);
+                return lower;
             }
-            let by = DVector::from_fn(n, |k, _| trial.terms[coordinates[k].0].x[coordinates[k].1] - x(k));
-            if let Ok(residuals) = self.residuals_of(&trial, runs) {
-                let chi2: f64 = residuals.iter().map(|r| sum_of_squares(r)).sum();
-                if chi2 < here.chi2 {
-                    *lambda = (*lambda * 0.1).max(1e-9);
-                    let promised = -2.0 * gradient.dot(&by) - by.dot(&(information * &by));
-                    return Some(Step { model: trial, by, residuals, chi2, promised });
-                }
-            }
-            if !here.is_by_differences || trial == *model {
+            if is_last {
                 return None;
             }
             *lambda *= 10.0;
-            if *lambda > 1e6 {
-                return None;
-            }
         }
+        None
+    }
+
+    /// The coordinates that a step leaves as they are: one that is `fixed`, those at a bound with the gradient pointing outwards, and those that do nothing.
+    fn held(
+        &self,
+        model: &Model,
+        Linearised { information, gradient, .. }: &Linearised,
+        fixed: Option<(usize, usize)>,
+    ) -> Vec<bool> {
+        let is_held = |(k, (term, parameter)): (usize, (usize, usize))| {
+            let own = &model.terms[term];
+            let [low, high] = self.plant.candidates()[own.candidate].parameters[parameter].bounds;
+            let x = own.x[parameter];
+            let leads_out = (x <= low && gradient[k] > 0.0) || (x >= high && gradient[k] < 0.0);
+            Some((term, parameter)) == fixed || leads_out || information[(k, k)] <= 0.0
+        };
+        coordinates(model).into_iter().enumerate().map(is_held).collect()
+    }
+
+    /// A model with its coordinates moved, within their bounds, and by how much they moved.
+    pub(super) fn moved_by(&self, model: &Model, by: &DVector<f64>) -> (Model, DVector<f64>) {
+        let (mut moved, mut done) = (model.clone(), by.clone());
+        for ((term, parameter), by) in coordinates(model).into_iter().zip(done.iter_mut()) {
+            let own = &mut moved.terms[term];
+            let [low, high] = self.plant.candidates()[own.candidate].parameters[parameter].bounds;
+            let before = own.x[parameter];
+            own.x[parameter] = (before + *by).clamp(low, high);
+            *by = own.x[parameter] - before;
+        }
+        (moved, done)
     }
 
     /// Profile χ²: the coordinate `held` (term, parameter) is fixed and all others are fitted, to the convergence of [`Convergence::Rank`].
@@ -772,4 +810,28 @@ pub(super) fn normal_equations(residuals: &[Residuals], derivatives: &Derivative
 /// Inner product over all runs.
 fn dot(a: &[Residuals], b: &[Residuals]) -> f64 {
     a.iter().zip(b).map(|(a, b)| inner(a, b)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::plant::{Free, Term};
+    use crate::diagnose::waves::{Waves, candidate, power};
+
+    #[test]
+    fn a_fit_follows_a_curved_valley_to_its_end() {
+        let mut plant = Waves::new(&[]);
+        let mut law = candidate("power");
+        law.parameters[0] = Free { bounds: [0.0, 1e6], scale: 100.0, ..law.parameters[0] };
+        law.parameters.push(Free { name: "exponent", off: None, bounds: [0.1, 4.0], scale: 0.4, ..law.parameters[0] });
+        plant.candidates = vec![law];
+        for signal in &mut plant.signals {
+            signal.values.iter_mut().enumerate().for_each(|(at, value)| *value += power(100.0, 0.2, at));
+        }
+        let start = Model::new(vec![Term { candidate: 0, x: vec![2000.0, 2.0] }], 1.0, false);
+        let fit = Estimator::new(&plant).fit(&start, &[0, 1, 2, 3, 4, 5], Convergence::Full).unwrap();
+        assert!((fit.model.terms[0].x[1] - 0.2).abs() < 0.01, "{:?}", fit.model);
+        let per_value = fit.chi2 / fit.count as f64;
+        assert!(per_value < 1.1, "{per_value}");
+    }
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::blocks::blocks;
-use super::budget::Phase;
+use super::budget::{Phase, first_resolution};
 use super::fit::{Convergence, Derivatives, Estimator, Fit, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::naming::LEAST_TAKEN;
 use super::noise;
@@ -902,11 +902,16 @@ impl Search<'_> {
                 (self.progress)(&format!("doing without {}", self.id(best.model().terms[index].candidate)));
                 self.ranked(&self.without(&best, index)?)
             };
-            // First those within the error of the discretisation, unless more than half the noise comes back: no other discretisation does just that then.
-            let is_idle = |term: &Term| !self.is_credible(&best, term) && !kept.contains(&term.candidate);
+            // First those within the error of the discretisation, or of the one that the search began with: a finer one and a constant may stand together for one between.
+            // They stay where more than half the noise comes back in any discretisation.
+            let plant = self.estimator.plant;
+            let resolution = best.model().resolution.min(first_resolution(plant));
+            let is_idle = |term: &Term| !plant.is_credible(term, resolution) && !kept.contains(&term.candidate);
             if let Some(idle) = best.model().terms.iter().position(is_idle) {
+                let most = self.above(&best) + VISIBLE;
                 let without = self.fitted(shorter(idle)?.model())?;
-                if self.above(&without) < self.above(&best) + VISIBLE {
+                let without = if self.above(&without) < most { without } else { self.resolve(without, Convergence::Full) };
+                if self.above(&without) < most {
                     best = without;
                 } else {
                     kept.push(best.model().terms[idle].candidate);
@@ -951,7 +956,7 @@ impl Search<'_> {
         let mut among_others = of(&others, &others);
         (0..others.len()).for_each(|k| among_others[(k, k)] *= 1.0 + LEAST_RIDGE);
         let Some(shift) = among_others.lu().solve(&-(of(&others, &own) * by)) else { return Ok(plain) };
-        let moved = self.moved_by(&plain, &shift);
+        let moved = self.estimator.moved_by(&plain, &shift).0;
         let chi2 = |model: &Model| -> Result<f64, DiagnoseError> {
             Ok(self.estimator.residuals_of(model, &self.split.fit)?.iter().map(|r| sum_of_squares(r)).sum())
         };
@@ -1107,17 +1112,6 @@ impl Search<'_> {
     /// A rival of the model `best` in the discretisation that suits it as the best one's does, if another one may make up for what it leaves beyond that.
     pub(super) fn resolved_if_near(&self, rival: Scored, best: &Scored) -> Scored {
         if rival.total() < best.total() + self.tolerance() { self.resolve(rival, Convergence::Full) } else { rival }
-    }
-
-    /// A model with its coordinates moved, within their bounds.
-    fn moved_by(&self, model: &Model, by: &DVector<f64>) -> Model {
-        let mut moved = model.clone();
-        for ((term, parameter), by) in coordinates(model).into_iter().zip(by.iter()) {
-            let [low, high] = self.candidate(&model.terms[term]).parameters[parameter].bounds;
-            let x = &mut moved.terms[term].x[parameter];
-            *x = (*x + by).clamp(low, high);
-        }
-        moved
     }
 }
 
@@ -1332,6 +1326,21 @@ mod tests {
             let search = search(&plant);
             let best = search.fitted(&search.with_constants(&Model::new(Vec::new(), 1.0, false))).unwrap();
             assert_eq!(search.backward(best).unwrap().model().terms.len() == 1, stays, "{amplitude}");
+        }
+    }
+
+    #[test]
+    fn a_constant_and_a_finer_discretisation_that_stand_for_one_between_are_none() {
+        // A resolution of 2 adds an amplitude of 1, which the constant takes off again; the first one adds none.
+        for (first, stays) in [(1.0, false), (2.0, true)] {
+            let mut plant = Waves::new(&[]);
+            plant.candidates[0].is_constant = true;
+            (plant.resolutions, plant.tolerance) = (vec![first, 2.0], 1.5 * first);
+            let search = search(&plant);
+            let best = search.fitted(&search.with_constants(&Model::new(Vec::new(), 2.0, false))).unwrap();
+            assert!((best.model().terms[0].x[0] + 1.0).abs() < 0.1);
+            let found = search.backward(best).unwrap();
+            assert_eq!((found.model().terms.len() == 1, found.model().resolution), (stays, first), "{first}");
         }
     }
 

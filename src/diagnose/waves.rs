@@ -12,7 +12,7 @@ pub(super) struct Waves {
     pub(super) candidates: Vec<Candidate>,
     /// Above 1 they add the wave `other` with an amplitude of what they exceed 1 by.
     pub(super) resolutions: Vec<f64>,
-    /// Constants within this are within the error of the discretisation.
+    /// Constants within this, over the resolution, are within the error of the discretisation.
     pub(super) tolerance: f64,
     /// Amplitude of the wave `late` that a share of 0 adds to a model, per amplitude of its wave `other`; 0 for runs without shares.
     pub(super) lateness: f64,
@@ -38,6 +38,11 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
 /// What a cause does; `limit` takes what is above 1/x from the wave `other` with an amplitude of 3.
 fn part(id: &str, x: f64, run: usize, at: usize) -> f64 {
     if id == "limit" { -(3.0 * wave("other", run, at) - 1.0 / x).max(0.0) } else { x * wave(id, run, at) }
+}
+
+/// A power law of what doubles: its size and its exponent lie in a curved valley of χ².
+pub(super) fn power(size: f64, exponent: f64, at: usize) -> f64 {
+    size * 10_f64.powf(exponent * (0.3 * at as f64 / VALUES as f64 - 1.3))
 }
 
 /// A cause with one parameter, 0 for none.
@@ -124,6 +129,9 @@ impl Plant for Waves {
 
     fn predict(&self, model: &Model, run: usize, nuisance: &Nuisance) -> Result<Vec<f64>, DiagnoseError> {
         let of = |term: &Term, at| {
+            if self.candidates[term.candidate].id == "power" {
+                return power(term.x[0], term.x[1], at);
+            }
             let more = term.x.get(1).map_or(0.0, |y| y * wave("other", run, at));
             part(self.candidates[term.candidate].id, term.x[0], run, at) + more
         };
@@ -139,8 +147,8 @@ impl Plant for Waves {
         Ok((0..VALUES).map(value).collect())
     }
 
-    fn is_credible(&self, term: &Term, _resolution: f64) -> bool {
-        !self.candidates[term.candidate].is_constant || term.x[0].abs() > self.tolerance
+    fn is_credible(&self, term: &Term, resolution: f64) -> bool {
+        !self.candidates[term.candidate].is_constant || term.x[0].abs() > self.tolerance / resolution
     }
 
     fn resolutions(&self) -> Vec<f64> {
