@@ -191,7 +191,6 @@ impl JointExtensions {
     }
 
     /// Elastic torque of softening and of the curve of the deviation, and its slope, at the elastic angle δ of quad `k`.
-    #[inline(always)]
     fn elastic(&self, k: usize, quad: &Quad, delta: Lanes) -> (Lanes, Lanes) {
         let (mut torque, mut slope) = (Lanes::ZERO, Lanes::ZERO);
         if self.softening != 0.0 {
