@@ -6,6 +6,8 @@
 //!
 //! The nuisance parameters of a run ([`Plant::nuisances`]), such as times of jumps between rows, are fitted run by run, in turn with the model's
 //! parameters. Every sum has a fixed order, so results do not depend on the number of threads.
+//!
+//! The file is long because fits, nuisance parameters, faults of the bench and variances share the state of one estimator.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -96,15 +98,15 @@ impl Linearised {
         after - &self.gradient - &self.information * &step.by
     }
 
-    /// Size of a step, in units of what each coordinate does.
-    fn size(&self, by: &DVector<f64>) -> f64 {
+    /// Squared length of a step, in units of what each coordinate does.
+    fn squared_length(&self, by: &DVector<f64>) -> f64 {
         by.iter().enumerate().map(|(k, by)| self.information[(k, k)] * by * by).sum()
     }
 
     /// Moves to the end of a step: the least change of the derivatives, in units of what they do, that gives the residuals there (Broyden 1965).
     fn follow(&mut self, step: Step) {
         let weighted: Vec<f64> = step.by.iter().enumerate().map(|(k, by)| self.information[(k, k)] * by).collect();
-        let size = self.size(&step.by);
+        let size = self.squared_length(&step.by);
         for (run, after) in step.residuals.iter().enumerate() {
             for (value, after) in after.iter().enumerate() {
                 let promised: f64 = self.derivatives.iter().zip(step.by.iter()).map(|(column, by)| column[run][value] * by).sum();
@@ -458,9 +460,10 @@ impl<'a> Estimator<'a> {
                 |gradient: &DVector<f64>| factors.solve(&DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { -gradient[k] }));
             let straight = step(&against(gradient)?);
             let curved = |straight: &Step| {
-                let aside = against(&here.bend(straight)).filter(|aside| here.size(aside) < here.size(&straight.by))?;
+                let is_shorter = |other: &DVector<f64>| here.squared_length(other) < here.squared_length(&straight.by);
+                let correction = against(&here.bend(straight)).filter(is_shorter)?;
                 // Nothing is promised for what the derivatives do not tell: they are taken anew at its end.
-                Some(Step { promised: f64::INFINITY, ..step(&(&straight.by + aside))? })
+                Some(Step { promised: f64::INFINITY, ..step(&(&straight.by + correction))? })
             };
             let is_lower = |step: &Step| step.chi2 < here.chi2;
             let is_still = straight.as_ref().is_some_and(|straight| straight.model == *model);
@@ -830,6 +833,7 @@ mod tests {
         }
         let start = Model::new(vec![Term { candidate: 0, x: vec![2000.0, 2.0] }], 1.0, false);
         let fit = Estimator::new(&plant).fit(&start, &[0, 1, 2, 3, 4, 5], Convergence::Full).unwrap();
+        // Six standard errors.
         assert!((fit.model.terms[0].x[1] - 0.2).abs() < 0.01, "{:?}", fit.model);
         let per_value = fit.chi2 / fit.count as f64;
         assert!(per_value < 1.1, "{per_value}");

@@ -903,7 +903,7 @@ impl Search<'_> {
                 self.ranked(&self.without(&best, index)?)
             };
             // First those within the error of the discretisation, or of the one that the search began with: a finer one and a constant may stand together for one between.
-            // They stay where more than half the noise comes back in any discretisation.
+            // They stay where more than half the noise comes back in the discretisation that suits the model without them, too.
             let plant = self.estimator.plant;
             let resolution = best.model().resolution.min(first_resolution(plant));
             let is_idle = |term: &Term| !plant.is_credible(term, resolution) && !kept.contains(&term.candidate);
