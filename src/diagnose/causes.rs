@@ -220,7 +220,9 @@ fn select(
         let (before, held) = (search.estimator.state(), search.estimator.held_spread.take());
         let with = search.settle(best.clone())?;
         faults_come_last = false;
-        if do_faults_explain(search, &with, search.above(&best)) {
+        // Causes that cost more without faults than faults alone stand on a bench with faults, whatever else is missing.
+        let is_dearer = search.cost(&best) > search.cost(with_faults).max(search.cost(&with)) + LEAST_COST;
+        if is_dearer || do_faults_explain(search, &with, search.above(&best)) {
             search.set_unexplained(with_faults);
             best = search.backward(with)?;
         } else {
@@ -453,12 +455,11 @@ mod tests {
         }
     }
 
-    #[test]
-    fn causes_are_measured_by_what_constants_leave_with_faults_where_faults_explain_it() {
-        // Zeros leave 2500 per value, of which 0.4 % would be worth a cause; the wave takes 4.5.
-        let mut plant = Waves::new(&[("other", 3.0)]);
+    /// The causes that are selected without faults of the bench first, where `waves` and zeros of ±`zero` are hidden, and only `other` is a candidate.
+    fn select_beside_zeros(waves: &[(&str, f64)], zero: f64, check: impl Fn(&Search, &Causes, &Scored)) {
+        let mut plant = Waves::new(waves);
         for (run, signal) in plant.signals.iter_mut().enumerate() {
-            signal.values.iter_mut().for_each(|value| *value += if run % 2 == 0 { 50.0 } else { -50.0 });
+            signal.values.iter_mut().for_each(|value| *value += if run % 2 == 0 { zero } else { -zero });
         }
         plant.candidates.truncate(1);
         let mut search = search(&plant);
@@ -469,10 +470,29 @@ mod tests {
         let start = search.fitted(&Model { spread: off, ..with_faults.model().clone() }).unwrap();
         search.set_unexplained(&start);
         let causes = select(&mut search, &start, &with_faults, false).unwrap();
-        assert_ne!(causes.best.model().spread, off);
-        let with_wave = Model { terms: vec![Term { candidate: 0, x: vec![1.0] }], ..with_faults.model().clone() };
-        let kept = search.backward(search.fitted(&with_wave).unwrap()).unwrap();
-        assert_eq!(kept.model().terms.len(), 1);
+        check(&search, &causes, &with_faults);
+    }
+
+    #[test]
+    fn causes_are_measured_by_what_constants_leave_with_faults_where_faults_explain_it() {
+        // Zeros leave 2500 per value, of which 0.4 % would be worth a cause; the wave takes 4.5.
+        select_beside_zeros(&[("other", 3.0)], 50.0, |search, causes, with_faults| {
+            assert_ne!(causes.best.model().spread, search.estimator.given_spread());
+            let with_wave = Model { terms: vec![Term { candidate: 0, x: vec![1.0] }], ..with_faults.model().clone() };
+            let kept = search.backward(search.fitted(&with_wave).unwrap()).unwrap();
+            assert_eq!(kept.model().terms.len(), 1);
+        });
+    }
+
+    #[test]
+    fn faults_stay_where_causes_cost_more_without_them_than_constants_do_with_them() {
+        // No candidate follows a wave that leaves 4 per value. The one that a candidate follows takes 32, zeros take 49 or 16.
+        for (zero, stays) in [(7.0, true), (4.0, false)] {
+            select_beside_zeros(&[("other", 8.0), ("first", 3.0)], zero, |search, causes, _| {
+                assert_eq!(causes.best.model().terms.len(), 1);
+                assert_eq!(causes.best.model().spread != search.estimator.given_spread(), stays);
+            });
+        }
     }
 
     #[test]
