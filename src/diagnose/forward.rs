@@ -298,11 +298,6 @@ impl Search<'_> {
         self.settled_if(trial, |search, settled| search.is_worth(settled, base))
     }
 
-    /// True if a trial takes more than it leaves: that cannot stand for it, though on the select runs, which have to show it too, it may be so much that all could be chance.
-    fn takes_more_than_it_leaves(&self, trial: &Scored, base: &Scored) -> bool {
-        self.takes_much(trial, base) && self.above(base) > 2.0 * self.above(trial)
-    }
-
     /// A cause, or a free form, that shows in fit runs only: where the run that it improves most is selected on as well, the cause, fitted to the others, has to improve it
     /// too. In the place of a free form a name counts as in [`top`](Self::top). If it does, that run counts in the fit again unless the other select runs are
     /// predicted worse so: it may be the one that shows how large the cause is, or what its law does not follow.

@@ -505,12 +505,18 @@ impl Search<'_> {
         self.gap(more, less, runs).0 > LEAST_SIGMAS && more.bic() < less.bic() - LEAST_BIC
     }
 
-    /// True if a further parameter is beyond chance on the select runs, or the fit runs need it and the select runs, which may hardly show it, do not
-    /// speak against it.
+    /// True if a further parameter is beyond chance on the select runs, or takes more than what is left with it, or the fit runs need it and the select runs, which may
+    /// hardly show it, do not speak against it.
     pub(super) fn is_shown(&self, more: &Scored, less: &Scored) -> bool {
         let is_against = || self.gap(less, more, &self.split.select).0 > TIED_SIGMAS;
         self.is_significant(more, less)
+            || self.takes_more_than_it_leaves(more, less)
             || (self.is_seen_by_fit(more, less) && self.is_significant_on(&self.split.fit, more, less) && !is_against())
+    }
+
+    /// True if `more` takes more than it leaves: that cannot stand for it, though on the select runs, which have to show it too, it may be so much that all could be chance.
+    pub(super) fn takes_more_than_it_leaves(&self, more: &Scored, less: &Scored) -> bool {
+        self.takes_much(more, less) && self.above(less) > 2.0 * self.above(more)
     }
 
     /// True if `more` is worth its additional parameters over `less`, which has another cause in its place: as is worth a cause, or as the fit runs need, or
@@ -1302,6 +1308,23 @@ mod tests {
         for (shares, shown) in [([0.9, 1.0], true), ([0.96, 1.0], false), ([0.9, 1.1], false), ([0.96, 0.9], true)] {
             let [more, less] = pair(&search, shares);
             assert_eq!(search.is_shown(&more, &less), shown, "{shares:?}");
+        }
+    }
+
+    #[test]
+    fn a_law_that_takes_more_than_it_leaves_is_shown_though_that_may_be_chance() {
+        // The further parameter takes 4.5 per value; 4 or 8 are left, which follow it for half a period in each block.
+        for (late, shown) in [(3.0, true), (4.0, false)] {
+            let plant = Waves::new(&[("second", 5.0), ("other", 3.0), ("late", late)]);
+            let mut search = search(&plant);
+            search.estimator.held_spread = Some(search.estimator.given_spread());
+            (search.split.fit, search.split.select) = (vec![1, 3], vec![0]);
+            let plain = search.fitted(&Model::new(vec![Term { candidate: 2, x: vec![1.0] }], 1.0, false)).unwrap();
+            let law = search.fitted(&Model::new(vec![Term { candidate: 3, x: vec![1.0, 1.0] }], 1.0, false)).unwrap();
+            let is_significant = |runs: &[usize]| search.is_significant_on(runs, &law, &plain);
+            assert!(!is_significant(&search.split.select) && !is_significant(&search.split.fit), "{late}");
+            assert_eq!(search.with_its_law(plain, 0).model().terms[0].candidate == 3, shown, "{late}");
+            assert_eq!(search.with_its_plain_law(law, 0).model().terms[0].candidate == 3, shown, "{late}");
         }
     }
 
