@@ -14,6 +14,9 @@ use super::verdict::LEFT_SHARE;
 /// A model selected without the bench's faults counts if its cost, with ln N for each coordinate, is lower by this.
 const LEAST_COST: f64 = 10.0;
 
+/// Where the bench's faults leave next to nothing of what constants leave without them, causes without faults are given up if the first one leaves more than this share.
+const MOST_LEFT_BY_FIRST: f64 = 0.5;
+
 /// A cause takes the place of another with which it is tied if χ² is lower by this.
 const LIKELIER: f64 = 4.0;
 
@@ -65,16 +68,20 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
         calibrated.clone()
     };
     search.set_unexplained(&start);
-    // Two causes that cost more than the bench's faults alone are not what is missing where these leave next to nothing. Faults that follow what a driver does from run to
-    // run leave a small share of much, and yet structure.
-    let may_be_all = has_faults && search.share_left(calibrated) <= LEFT_SHARE && search.above(calibrated) <= VISIBLE;
-    search.limit = if may_be_all { search.cost(calibrated) } else { f64::INFINITY };
+    search.limits = [f64::INFINITY; 2];
+    if has_faults && search.share_left(calibrated) <= LEFT_SHARE {
+        // A first cause that takes less than that follows the faults.
+        search.limits[0] = MOST_LEFT_BY_FIRST * search.cost(&start);
+        // Two causes that cost more than the faults alone are not what is missing where these leave nothing to see. Faults that follow what a driver does from run to run
+        // leave a small share of much, and yet structure.
+        search.limits[1] = if search.above(calibrated) <= VISIBLE { search.cost(calibrated) } else { search.limits[0] };
+    }
     // Constants that stand in for faults may lead to where nothing can be simulated.
     let plain = match select(search, &start, calibrated, is_insufficient) {
         Err(_) if has_faults => None,
         plain => Some(plain?),
     };
-    search.limit = f64::INFINITY;
+    search.limits = [f64::INFINITY; 2];
     // Causes that leave next to nothing without any fault are no faults.
     let may_be_faults = |causes: &Causes| {
         let own = search.cost(&causes.best);

@@ -489,6 +489,20 @@ mod tests {
     }
 
     #[test]
+    fn causes_that_cost_more_than_the_limit_for_so_many_are_given_up() {
+        let plant = Waves::new(&[("other", 6.0), ("first", 3.0)]);
+        // The larger cause takes 18 of 22.5 per value.
+        for (limits, count) in [([1.0; 2], 2), ([0.1, 1.0], 1), ([1.0, 0.01], 2)] {
+            let mut search = search(&plant);
+            let plain = search.calibrated(1.0).unwrap();
+            search.limits = limits.map(|share| share * search.cost(&plain));
+            let (best, _) = search.forward(plain).unwrap();
+            assert_eq!(best.model().terms.len(), count, "{limits:?}");
+            assert_eq!(search.is_given_up(&best), limits != [1.0; 2], "{limits:?}");
+        }
+    }
+
+    #[test]
     fn a_cause_that_takes_more_than_it_leaves_is_adopted_though_that_may_be_chance() {
         // The cause takes 4.5 per value; 3 or 8 are left, which follow it for half a period in each block.
         for (late, count) in [(2.5, 1), (4.0, 0)] {

@@ -119,8 +119,8 @@ pub struct Search<'a> {
     pub split: Split,
     /// χ² per value above 1 of re-tuned constants on the select runs.
     pub unexplained: f64,
-    /// Models with two causes that cost more are given up; infinite for none.
-    pub limit: f64,
+    /// Models with one cause, and with two or more, that cost more are given up; infinite for none.
+    pub limits: [f64; 2],
     /// The phase that is under way; no free form is a candidate in those by names.
     pub(super) phase: Phase,
     /// Receives the current task, in words.
@@ -210,7 +210,7 @@ impl<'a> Search<'a> {
     /// A search that has not begun yet.
     pub fn new(plant: &'a dyn Plant, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Self {
         let estimator = Estimator::new(plant);
-        Self { estimator, split, progress, unexplained: 0.0, limit: f64::INFINITY, phase: Phase::Plain }
+        Self { estimator, split, progress, unexplained: 0.0, limits: [f64::INFINITY; 2], phase: Phase::Plain }
     }
 }
 
@@ -247,9 +247,10 @@ impl Search<'_> {
         scored.total() + scored.freedom() as f64 * (self.estimator.count(&self.split.all()) as f64).ln()
     }
 
-    /// True if a model has two causes and costs more than the limit.
+    /// True if a model costs more than one with so many causes may.
     pub fn is_given_up(&self, scored: &Scored) -> bool {
-        self.causes(scored) >= 2 && self.cost(scored) > self.limit
+        let limit = self.causes(scored).checked_sub(1).map_or(f64::INFINITY, |further| self.limits[further.min(1)]);
+        self.cost(scored) > limit
     }
 
     /// Number of causes of a model that are no constants.
