@@ -109,7 +109,12 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
                     search.estimator.restore(after.0);
                     search.split = after.1;
                     search.unexplained = plain.unexplained;
-                    plain
+                    if is_insufficient || plain.best.model().spread == without || has_free_forms(search, &plain.best) {
+                        plain
+                    } else {
+                        let (best, replaced) = replace(search, plain.best, calibrated.model().resolution)?;
+                        Causes { best, replaced, ..plain }
+                    }
                 }
                 _ => other,
             }
@@ -223,6 +228,7 @@ fn select(
     let share_left = search.share_left(&best);
     // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
     let (mut cost_with_faults, mut faults_come_last) = (f64::INFINITY, search.estimator.held_spread.is_some());
+    let mut are_faults_let_in = false;
     if share_left > SOUGHT && faults_come_last {
         let (before, held) = (search.estimator.state(), search.estimator.held_spread.take());
         let with = search.settle(best.clone())?;
@@ -232,6 +238,7 @@ fn select(
         if is_dearer || do_faults_explain(search, &with, search.above(&best)) {
             search.set_unexplained(with_faults);
             best = search.backward(with)?;
+            are_faults_let_in = true;
         } else {
             cost_with_faults = search.cost(&with);
             search.estimator.restore(before);
@@ -239,8 +246,9 @@ fn select(
         }
     }
 
-    // Causes are replaced once free forms have got their names, for which others are tried then anyway.
-    let (mut best, replaced) = if is_insufficient || has_free_forms(search, &best) {
+    // Causes are replaced once free forms have got their names, for which others are tried then anyway, and those with faults let in once they are better than what is
+    // found with faults from the beginning.
+    let (mut best, replaced) = if is_insufficient || are_faults_let_in || has_free_forms(search, &best) {
         (best, Vec::new())
     } else {
         let phase = search.phase;
@@ -462,13 +470,18 @@ mod tests {
         }
     }
 
-    /// The causes that are selected without faults of the bench first, where `waves` and zeros of ±`zero` are hidden, and only `other` is a candidate.
-    fn select_beside_zeros(waves: &[(&str, f64)], zero: f64, check: impl Fn(&Search, &Causes, &Scored)) {
+    /// The causes that are selected without faults of the bench first, where `waves` and zeros of ±`zero` are hidden.
+    fn select_beside_zeros(
+        waves: &[(&str, f64)],
+        zero: f64,
+        candidates: &[&'static str],
+        check: impl Fn(&Search, &Causes, &Scored),
+    ) {
         let mut plant = Waves::new(waves);
         for (run, signal) in plant.signals.iter_mut().enumerate() {
             signal.values.iter_mut().for_each(|value| *value += if run % 2 == 0 { zero } else { -zero });
         }
-        plant.candidates.truncate(1);
+        plant.candidates = candidates.iter().map(|id| candidate(id)).collect();
         let mut search = search(&plant);
         let with_faults = search.calibrated(1.0).unwrap();
         let off = search.estimator.given_spread();
@@ -483,7 +496,7 @@ mod tests {
     #[test]
     fn causes_are_measured_by_what_constants_leave_with_faults_where_faults_explain_it() {
         // Zeros leave 2500 per value, of which 0.4 % would be worth a cause; the wave takes 4.5.
-        select_beside_zeros(&[("other", 3.0)], 50.0, |search, causes, with_faults| {
+        select_beside_zeros(&[("other", 3.0)], 50.0, &["other"], |search, causes, with_faults| {
             assert_ne!(causes.best.model().spread, search.estimator.given_spread());
             let with_wave = Model { terms: vec![Term { candidate: 0, x: vec![1.0] }], ..with_faults.model().clone() };
             let kept = search.backward(search.fitted(&with_wave).unwrap()).unwrap();
@@ -495,9 +508,20 @@ mod tests {
     fn faults_stay_where_causes_cost_more_without_them_than_constants_do_with_them() {
         // No candidate follows a wave that leaves 4 per value. The one that a candidate follows takes 32, zeros take 49 or 16.
         for (zero, stays) in [(7.0, true), (4.0, false)] {
-            select_beside_zeros(&[("other", 8.0), ("first", 3.0)], zero, |search, causes, _| {
+            select_beside_zeros(&[("other", 8.0), ("first", 3.0)], zero, &["other"], |search, causes, _| {
                 assert_eq!(causes.best.model().terms.len(), 1);
                 assert_eq!(causes.best.model().spread != search.estimator.given_spread(), stays);
+            });
+        }
+    }
+
+    #[test]
+    fn causes_beside_faults_that_were_let_in_are_not_replaced_before_they_are_chosen() {
+        // As above; another candidate does nearly what the first one does.
+        for (zero, is_replaced) in [(7.0, false), (4.0, true)] {
+            select_beside_zeros(&[("first", 8.0), ("other", 3.0)], zero, &["first", "second"], |search, causes, _| {
+                assert_eq!(causes.best.model().spread == search.estimator.given_spread(), is_replaced);
+                assert_eq!(!causes.replaced.is_empty(), is_replaced, "{zero}");
             });
         }
     }
