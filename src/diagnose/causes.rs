@@ -227,10 +227,11 @@ fn select(
     best = search.resolve(best, Convergence::Rank);
     let share_left = search.share_left(&best);
     // Faults of the bench could stand in for causes that leave next to nothing without them: they come last then.
-    let (mut cost_with_faults, mut faults_come_last) = (f64::INFINITY, search.estimator.held_spread.is_some());
-    let mut are_faults_let_in = false;
+    let held = search.estimator.held_spread;
+    let (mut cost_with_faults, mut faults_come_last) = (f64::INFINITY, held.is_some());
     if share_left > SOUGHT && faults_come_last {
-        let (before, held) = (search.estimator.state(), search.estimator.held_spread.take());
+        let before = search.estimator.state();
+        search.estimator.held_spread = None;
         let with = search.settle(best.clone())?;
         faults_come_last = false;
         // Causes that cost more without faults than faults alone stand on a bench with faults, whatever else is missing.
@@ -238,7 +239,6 @@ fn select(
         if is_dearer || do_faults_explain(search, &with, search.above(&best)) {
             search.set_unexplained(with_faults);
             best = search.backward(with)?;
-            are_faults_let_in = true;
         } else {
             cost_with_faults = search.cost(&with);
             search.estimator.restore(before);
@@ -248,6 +248,7 @@ fn select(
 
     // Causes are replaced once free forms have got their names, for which others are tried then anyway, and those with faults let in once they are better than what is
     // found with faults from the beginning.
+    let are_faults_let_in = held.is_some_and(|held| best.model().spread != held);
     let (mut best, replaced) = if is_insufficient || are_faults_let_in || has_free_forms(search, &best) {
         (best, Vec::new())
     } else {
