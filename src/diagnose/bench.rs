@@ -300,6 +300,11 @@ pub fn spread(runs: &[Moments], given: &[Option<f64>; KINDS], established: &Spre
     }
 }
 
+/// The kinds whose faults have a mean over the runs beyond chance, but for the clock's rate, which no cause is.
+pub fn shared(runs: &[Moments], spread: &Spread) -> Vec<usize> {
+    (0..KINDS).filter(|of| *of != Spread::RATE && is_shared(runs, spread, *of)).collect()
+}
+
 /// True if the mean of a kind's faults over the runs, of one channel, is beyond chance.
 fn is_shared(runs: &[Moments], spread: &Spread, of: usize) -> bool {
     let sd = spread.of[of];

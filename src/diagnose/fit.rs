@@ -659,12 +659,22 @@ impl<'a> Estimator<'a> {
         if let Some(held) = self.held_spread {
             return Ok(held);
         }
-        let with_columns = runs.iter().filter_map(|run| Some((*run, self.faults.get(*run)?)));
-        let moments = with_columns
-            .map(|(run, columns)| Ok(columns.moments(&self.misfit(model, run, &self.nuisances[run])?)))
-            .collect::<Result<Vec<_>, DiagnoseError>>()?;
         let established = if self.is_calibrated { model.spread } else { Spread::default() };
-        Ok(bench::spread(&moments, &self.plant.bench(), &established))
+        Ok(bench::spread(&self.moments(model, runs)?, &self.plant.bench(), &established))
+    }
+
+    /// The kinds of the bench's faults that have a mean over `runs` beyond chance under `model`: what that does, all runs share.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn shared_faults(&self, model: &Model, runs: &[usize]) -> Result<Vec<usize>, DiagnoseError> {
+        Ok(bench::shared(&self.moments(model, runs)?, &model.spread))
+    }
+
+    /// What runs contribute to the likelihood of the bench's faults.
+    fn moments(&self, model: &Model, runs: &[usize]) -> Result<Vec<bench::Moments<'_>>, DiagnoseError> {
+        let with_columns = runs.iter().filter_map(|run| Some((*run, self.faults.get(*run)?)));
+        with_columns.map(|(run, columns)| Ok(columns.moments(&self.misfit(model, run, &self.nuisances[run])?))).collect()
     }
 
     /// Masks single values whose residuals stand far above those around them in their channel, as after a tracker's slip, and returns their number.

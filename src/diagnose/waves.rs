@@ -29,6 +29,8 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
         "second" => -(7.0 * t + 0.12).sin(),
         // Hidden in the first run only.
         "once" if run > 0 => 0.0,
+        // The same in all runs.
+        "offset" => 1.0,
         "late" => (3.0 * t).cos(),
         "between" => wave("other", run, at) + 0.6 * wave("first", run, at),
         _ => (23.0 * t).cos(),
