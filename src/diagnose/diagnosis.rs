@@ -13,7 +13,7 @@ pub enum Verdict {
     None,
     /// The causes are identified.
     Named,
-    /// It is known where something is missing, but no named law of that place suits: its curve is shown.
+    /// It is known where something is missing, but no named law of that place suits: its curve is shown, or what the nearest name leaves.
     Located,
     /// Some causes cannot be told apart by these data.
     Tied,

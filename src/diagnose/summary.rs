@@ -46,7 +46,8 @@ fn located(effect: &Adopted, place_in_words: &dyn Fn(&str) -> String) -> String 
         .map(|near| format!("{} leaves {:.0} % of it", names::cause(&near.id), 100.0 * near.left))
         .collect();
     let near = if near.is_empty() { String::new() } else { format!(" ({})", near.join(", ")) };
-    format!("another law of {}, shown as a curve{near}", place_in_words(&effect.place))
+    let curve = if effect.curve.is_some() { ", shown as a curve" } else { "" };
+    format!("another law of {}{curve}{near}", place_in_words(&effect.place))
 }
 
 /// What the sentence is about.
@@ -118,8 +119,10 @@ pub(super) fn summary(verdict: Verdict, findings: &Findings) -> String {
     let finely = if refined { format!(", with {resolution} joints per actuator,") } else { String::new() };
     let but: Vec<&str> = unseen.into_iter().chain(failing).collect();
     let but = if but.is_empty() { String::new() } else { format!(", but {}", but.join("; ")) };
+    // Its place is known by a name, not by a free form.
+    let is_by_name = verdict == Verdict::Located && effects.iter().all(|effect| effect.curve.is_none());
     let name = |effect: &Adopted| {
-        if effect.curve.is_some() {
+        if effect.curve.is_some() || is_by_name {
             return located(effect, place_in_words);
         }
         let parameters: Vec<_> = effect.parameters.iter().map(|p| names::words(&effect.id, p)).collect();

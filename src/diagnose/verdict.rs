@@ -6,7 +6,7 @@ use super::blocks::BLOCK;
 use super::intervals::{Intervals, intervals_of, numerics};
 use super::names;
 use super::plant::{Model, Plant, Term};
-use super::search::{Scored, Search, VISIBLE};
+use super::search::{Scored, Search, Trial, VISIBLE};
 use super::smoothing::smoothed;
 use super::split::Split;
 
@@ -15,6 +15,10 @@ pub(super) const LEFT_OVER: f64 = VISIBLE;
 /// ... and the verdict is unexplained if it is also by this share of what the refined nominal model leaves: a name stands with 95 % of what its place
 /// takes. For n causes, three or more, the share is divided by n − 1: many causes that still leave structure stand in for one that is not in the library.
 pub(super) const LEFT_SHARE: f64 = 0.05;
+/// What a single name leaves belongs to its place up to this share, ...
+const MOST_LEFT_AT_PLACE: f64 = 0.2;
+/// ... if whatever was fitted at another place leaves more than this multiple of it.
+const FARTHER: f64 = 2.0;
 /// No cause is named if a larger share is left.
 const NOTHING_NAMED: f64 = 0.5;
 /// 95 % quantiles of χ² of one to four degrees of freedom.
@@ -92,6 +96,19 @@ pub(super) fn judge(
     }
     let intervals = intervals_of(search, &best, &numerics)?;
     Ok(Judged { best, coarse, refined, left, unexplained_fraction, is_unexplained, intervals, remark })
+}
+
+/// True if what a model leaves belongs to the place of its only cause, `id`: a law of it is missing that is none of those that are known. The cause takes most of the misfit,
+/// and whatever was promising enough at other places to be fitted, of `tried`, leaves far more.
+pub(super) fn is_at_its_place<'t>(search: &Search, judged: &Judged, id: &str, tried: impl Iterator<Item = &'t Trial>) -> bool {
+    let mut terms = judged.best.model().terms.iter().map(|term| search.candidate(term));
+    let Some(own) = terms.find(|candidate| candidate.id == id && !candidate.is_constant) else { return false };
+    let is_elsewhere = |trial: &&Trial| {
+        let places = &search.estimator.plant.candidates()[trial.candidate].places;
+        !places.iter().any(|place| own.places.contains(place))
+    };
+    let nearest = tried.filter(is_elsewhere).map(|trial| search.above(&trial.scored)).min_by(f64::total_cmp);
+    judged.unexplained_fraction <= MOST_LEFT_AT_PLACE && nearest.is_none_or(|nearest| nearest > FARTHER * judged.left)
 }
 
 /// A term that the data do not tell from its absence, the least certain one if there are several, with a remark in words.

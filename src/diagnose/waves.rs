@@ -33,6 +33,7 @@ fn wave(id: &str, run: usize, at: usize) -> f64 {
         "offset" => 1.0,
         "late" => (3.0 * t).cos(),
         "between" => wave("other", run, at) + 0.6 * wave("first", run, at),
+        "near" => wave("other", run, at) + 0.3 * wave("first", run, at),
         _ => (23.0 * t).cos(),
     }
 }
