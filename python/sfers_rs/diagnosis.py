@@ -49,7 +49,7 @@ class Effect:
         share: of the misfit of the re-tuned nominal model that comes back without it (0 to 1).
         gain_heldout: share of the misfit above the noise that it removes from runs that neither fit nor selection saw (0 to 1).
         stability: share of resamples over runs in which it is chosen (0 to 1), or None with few runs.
-        curve: of a cause that was only located, its curve ``{x_name, x_unit, y_name, y_unit, x, y, ci95}``, or None.
+        curve: of a cause that was located by a free form, its curve ``{x_name, x_unit, y_name, y_unit, x, y, ci95}``, or None.
     """
 
     id: str

@@ -79,7 +79,8 @@ pub struct Adopted {
     pub stability: Option<f64>,
     /// The curve of a free form.
     pub curve: Option<Curve>,
-    /// The named causes that were tried in the stead of the place's free form, nearest first.
+    /// The named causes that were tried in the stead of the place's free form, nearest first; the cause itself, with the share of the misfit that it leaves, where its
+    /// place is known by it.
     pub nearest: Vec<Nearest>,
     /// Share of χ² above the noise that it removes from the runs that judge (0 to 1).
     pub gain_heldout: f64,

@@ -86,13 +86,7 @@ pub fn diagnose(
     let by_constants = Unseen::of(&search, &calibrated, &[], &[])?;
     let is_no_better = !is_nothing(&effects) && unseen.is_clearly_worse_than(&by_constants, &search);
     judged.is_unexplained |= is_no_better && judged.left > LEFT_OVER;
-    let tried = causes.trials.iter().chain(causes.replaced.iter().map(|other| &other.trial));
-    let single = single_name(&effects).filter(|_| judged.is_unexplained && !is_no_better);
-    let is_located = single.is_some_and(|id| is_at_its_place(&search, &judged, id, tried));
-    if is_located {
-        let own = |id: &str| Nearest { id: id.to_owned(), left: judged.unexplained_fraction };
-        effects.iter_mut().filter(|effect| is_cause(effect)).for_each(|effect| effect.nearest = vec![own(&effect.id)]);
-    }
+    let is_located = judged.is_unexplained && !is_no_better && is_located_by_name(&search, &judged, &causes, &mut effects);
     let insufficient = insufficient.or(too_few.filter(|_| is_nothing(&effects)));
     let mut remarks = doubts;
     if spikes > 0 {
@@ -224,11 +218,16 @@ fn is_cause(effect: &Adopted) -> bool {
     effect.role == Part::Cause && effect.id != "discretisation"
 }
 
-/// The name of a single cause that is no free form and tied with no other.
-fn single_name(effects: &[Adopted]) -> Option<&str> {
-    let mut causes = physics(effects);
-    let first = causes.next().filter(|effect| effect.curve.is_none() && !effect.is_tied())?;
-    causes.next().is_none().then_some(&first.id)
+/// True if the place of what is missing is known by a single cause that is no free form and tied with no other: it is the nearest name then.
+fn is_located_by_name(search: &Search, judged: &Judged, causes: &Causes, effects: &mut [Adopted]) -> bool {
+    let mut single = effects.iter_mut().filter(|effect| is_cause(effect));
+    let (Some(effect), None) = (single.next(), single.next()) else { return false };
+    let tried = causes.trials.iter().chain(causes.replaced.iter().map(|other| &other.trial));
+    if effect.curve.is_some() || effect.is_tied() || !is_at_its_place(search, judged, &effect.id, tried) {
+        return false;
+    }
+    effect.nearest = vec![Nearest { id: effect.id.clone(), left: judged.unexplained_fraction }];
+    true
 }
 
 fn is_nothing(effects: &[Adopted]) -> bool {
