@@ -47,6 +47,8 @@ pub(super) fn estimates(search: &Search, index: usize, term: &Term, found: &Inte
 struct Weighed {
     /// The model refitted without the cause.
     without: Scored,
+    /// What comes back without it (χ² per value).
+    own: f64,
     standing: Standing,
     /// Causes, or sets of two, that the data cannot tell from it.
     tied_with: Vec<String>,
@@ -66,13 +68,36 @@ fn weighed(
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let mut tied_with = ties.of(search, best, index);
     let without_it = search.screened(&without, responses, Some(index));
-    let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
+    let kinds = search.left_to_faults(best, &without);
+    let (own, standing) = if kinds.is_empty() {
+        let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
+        (comes_back(search, best, &without), standing)
+    } else {
+        // Faults would do its work: what it takes shows where they are held off, and so does what others would take.
+        let [best, without] = [best, &without].map(|scored| search.without_faults(scored, &kinds));
+        let (best, without) = (best?, without?);
+        let responses = responses_of_rivals(search, best.model())?;
+        let [beside, in_place] =
+            [(&best, None), (&without, Some(index))].map(|(of, removed)| search.screened(of, &responses, removed));
+        (comes_back(search, &best, &without), standing(search, [(&best, &beside), (&without, &in_place)], index, &[]))
+    };
     let mut pairs = pairs_in_place(search, best, (&without, &without_it), index, &tied_with);
     pairs.extend(shared(search, best, (screened, responses), index, &tied_with));
     let (sets, pairs): (Vec<String>, Vec<Model>) = pairs.into_iter().unzip();
     tied_with.extend(sets);
     tie_unstable(standing.stability, &mut tied_with, &standing.instead);
-    Ok(Weighed { without, standing, tied_with, pairs })
+    Ok(Weighed { without, own, standing, tied_with, pairs })
+}
+
+/// χ² per value that comes back without a cause.
+fn comes_back(search: &Search, best: &Scored, without: &Scored) -> f64 {
+    (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64
+}
+
+/// What all rivals of causes do beside a model. Free forms count in the stead of constants only.
+fn responses_of_rivals(search: &Search, model: &Model) -> Result<Responses, DiagnoseError> {
+    let has_constants = model.terms.iter().any(|term| search.candidate(term).is_constant);
+    search.responses(model, |_, c| if c.is_free_form { has_constants } else { !c.is_variant })
 }
 
 /// Ties a cause of this `stability` with those that are chosen `instead` or do its work, if it is unstable; ties in alphabetic order.
@@ -107,9 +132,7 @@ pub(super) fn adopted(
 ) -> Result<Adoption, DiagnoseError> {
     let best = &judged.best;
     let terms = &best.model().terms;
-    // Free forms count in the stead of constants only.
-    let has_constants = terms.iter().any(|term| search.candidate(term).is_constant);
-    let responses = search.responses(best.model(), |_, c| if c.is_free_form { has_constants } else { !c.is_variant })?;
+    let responses = responses_of_rivals(search, best.model())?;
     let screened = search.screened(best, &responses, None);
     let weighed: Vec<Weighed> = (0..terms.len())
         .map(|index| weighed(search, (best, &screened), index, ties, &responses))
@@ -127,14 +150,13 @@ pub(super) fn adopted(
         effects.push(discretisation(search, best, unseen.gain_over(&coarse, search)));
     }
     let (whole, mut taken) = (Whole::of(search, best, bare)?, vec![0.0; effects.len()]);
-    for (index, Weighed { without, standing, tied_with, .. }) in weighed.iter().enumerate() {
+    for (index, Weighed { without, own, standing, tied_with, .. }) in weighed.iter().enumerate() {
         let mut others = needs.clone();
         others.remove(index);
         let gain_heldout = unseen.gain_over(&Unseen::of(search, without, &others, &tuned)?, search);
         let mut effect = effect(search, judged, index, standing, tied_with);
-        let own = (search.chi2(without) - search.chi2(best)).max(0.0) / search.estimator.count(&search.split.all()) as f64;
-        taken.push(own);
-        effect.share = whole.share(search, best, index, own);
+        taken.push(*own);
+        effect.share = whole.share(search, best, index, *own);
         effect.gain_heldout = gain_heldout;
         if within.contains(&terms[index].candidate) {
             effect.role = Part::Minor;
@@ -329,6 +351,7 @@ fn discretisation(search: &Search, best: &Scored, gain_heldout: f64) -> Adopted 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::bench::Spread;
     use crate::diagnose::waves::{Waves, candidate, search};
 
     fn cause(id: &str, share: f64, stability: Option<f64>, tied_with: &[&str]) -> Adopted {
@@ -372,6 +395,30 @@ mod tests {
             tie_unstable(stability, &mut tied_with, &["c", "a", "b"]);
             assert_eq!(tied_with, tied, "{stability:?}");
         }
+    }
+
+    #[test]
+    fn what_a_cause_takes_is_measured_without_faults_that_would_do_its_work() {
+        // Zeros of ±0.4 about an offset: without it they take its place, and little comes back beside them.
+        let mut plant = Waves::new(&[("offset", 1.0)]);
+        plant.candidates = vec![candidate("offset")];
+        for (run, signal) in plant.signals.iter_mut().enumerate() {
+            signal.values.iter_mut().for_each(|value| *value += if run % 2 == 0 { 0.4 } else { -0.4 });
+        }
+        let mut search = search(&plant);
+        search.calibrated(1.0).unwrap();
+        search.estimator.is_calibrated = true;
+        let zeros = Spread { of: [0.0, 0.0, 0.0, 0.0, 0.4, 0.0] };
+        let term = Term { candidate: 0, x: vec![1.0] };
+        let best = search.fitted(&Model { spread: zeros, ..Model::new(vec![term], 1.0, false) }).unwrap();
+        let responses = responses_of_rivals(&search, best.model()).unwrap();
+        let screened = search.screened(&best, &responses, None);
+        let ties = Ties::new(&search, &best, &[]);
+        let Weighed { without, own, standing, .. } = weighed(&search, (&best, &screened), 0, &ties, &responses).unwrap();
+        assert!(comes_back(&search, &best, &without) < MINOR_MISFIT);
+        // The square of the offset.
+        assert!((own - 1.0).abs() < 0.1, "{own}");
+        assert_eq!(standing.stability, Some(1.0));
     }
 
     #[test]

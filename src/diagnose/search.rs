@@ -927,7 +927,7 @@ impl Search<'_> {
             }
             // A term without which the model diverges is needed, and so is one whose work would go to faults of the bench.
             let shorter = self.least_significant(&best).into_iter().filter_map(|index| shorter(index).ok());
-            let shorter = shorter.filter(|shorter| !self.is_left_to_faults(&best, shorter));
+            let shorter = shorter.filter(|shorter| self.left_to_faults(&best, shorter).is_empty());
             let least = shorter.min_by(|a, b| a.total().total_cmp(&b.total()));
             let Some(Ok(least)) = least.map(|least| self.fitted(least.model())) else { return Ok(best) };
             if self.is_needed(&best, &least) || self.is_seen_by_fit(&best, &least) {
@@ -937,15 +937,25 @@ impl Search<'_> {
         }
     }
 
-    /// True if faults of the bench have a mean over the runs beyond chance without a term of `best`, and none with it: a delay of all runs is no offset of their clocks.
-    fn is_left_to_faults(&self, best: &Scored, without: &Scored) -> bool {
+    /// The kinds of the bench's faults that have a mean over the runs beyond chance without a term of `best`, and none with it: a delay of all runs is no offset of their clocks.
+    pub(super) fn left_to_faults(&self, best: &Scored, without: &Scored) -> Vec<usize> {
         let shared = |scored: &Scored| self.estimator.shared_faults(scored.model(), &self.split.all()).unwrap_or_default();
-        let without = shared(without);
-        if without.is_empty() {
-            return false;
+        let mut kinds = shared(without);
+        if !kinds.is_empty() {
+            let with = shared(best);
+            kinds.retain(|kind| !with.contains(kind));
         }
-        let with = shared(best);
-        without.iter().any(|kind| !with.contains(kind))
+        kinds
+    }
+
+    /// A model with faults of the bench of some kinds held off.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn without_faults(&self, scored: &Scored, kinds: &[usize]) -> Result<Scored, DiagnoseError> {
+        let mut model = scored.model().clone();
+        kinds.iter().for_each(|kind| model.spread.of[*kind] = 0.0);
+        self.ranked_at_its_spread(&model)
     }
 
     /// True if a term of a model does more than its discretisation may be wrong by.
