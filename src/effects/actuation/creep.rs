@@ -1,7 +1,7 @@
 //! Domains keep switching slowly after a change of voltage.
 //!
 //! ```text
-//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p,  T_j ≤ T_max
+//! θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V·|V/1 kV|^e − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p,  T_j ≤ T_max
 //! ```
 //!
 //! The elements are a Kelvin-Voigt chain. T_max is three times the run's length unless it is given, so runs of different lengths have the same
@@ -9,7 +9,7 @@
 //! the longest one's length: elements that only some runs have would differ by their part of the first voltage, which they hold from before the run.
 //!
 //! With p = 0 the response to a step grows by the share c per decade of time beyond T_0, with another p by a power law of time. r is the number of elements per
-//! decade; r = 0 is a single element of the weight c.
+//! decade; r = 0 is a single element of the weight c. With e > 0 creep grows faster than the voltage, as domains switch more readily near the coercive field.
 //!
 //! # Parameters
 //! * `per_decade` (1/decade): growth c of the step response in the decade about 1 s, as a share of the immediate response
@@ -17,6 +17,7 @@
 //! * `rungs_per_decade` (–): r; 0 is a single element of the weight c
 //! * `fastest_s` (s): time constant T_0 of the first element
 //! * `slowest_s` (s): largest time constant T_max; 0 is three times the run's length
+//! * `voltage_exponent` (–): exponent e with which creep grows faster than the voltage
 //!
 //! # Source
 //! Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.
@@ -28,7 +29,7 @@ pub const CREEP: Effect = Effect {
     id: "creep",
     kind: Kind::Actuation,
     cause: "Domains keep switching slowly after a change of voltage.",
-    equation: "θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p",
+    equation: "θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V·|V/1 kV|^e − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p",
     source: "Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.",
     parameters: &[
         Parameter {
@@ -64,15 +65,30 @@ pub const CREEP: Effect = Effect {
             default: Some(0.0),
             about: "largest time constant T_max; 0 is three times the run's length",
         },
+        Parameter {
+            name: "voltage_exponent",
+            unit: "",
+            bounds: [0.0, 3.0],
+            off: None,
+            default: Some(0.0),
+            about: "exponent e with which creep grows faster than the voltage",
+        },
     ],
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
-        variants: &[Form {
-            fitted: &[("per_decade", 0.02), ("power", 0.2), ("fastest_s", 0.3)],
-            starts: &[&[0.02, 0.0, 0.3], &[0.02, 0.0, 3.0]],
-            given: &[("rungs_per_decade", 2.0)],
-        }],
+        variants: &[
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2), ("fastest_s", 0.3)],
+                starts: &[&[0.02, 0.0, 0.3], &[0.02, 0.0, 3.0]],
+                given: &[("rungs_per_decade", 2.0)],
+            },
+            Form {
+                fitted: &[("per_decade", 0.02), ("power", 0.2), ("voltage_exponent", 0.3)],
+                starts: &[&[0.02, 0.0, 0.7]],
+                given: &[("rungs_per_decade", 2.0)],
+            },
+        ],
         forms: &[
             Form {
                 fitted: &[("per_decade", 0.02), ("power", 0.2)],
@@ -100,7 +116,7 @@ pub const CREEP: Effect = Effect {
     action: Action::Voltages(|p, n, duration| {
         let chain = Chain { growth: p[0], power: p[1], per_decade: p[2], fastest: p[3] };
         let elements = chain.up_to(if p[4] > 0.0 { p[4] } else { 3.0 * duration });
-        Box::new(Creep { behind: vec![vec![0.0; n]; elements.len()], elements, chain, actuators: n })
+        Box::new(Creep { behind: vec![vec![0.0; n]; elements.len()], elements, exponent: p[5], chain, actuators: n })
     }),
 };
 
@@ -144,30 +160,42 @@ struct Creep {
     elements: Vec<[f64; 2]>,
     /// q_j (V), elements × actuators.
     behind: Vec<Vec<f64>>,
+    /// e.
+    exponent: f64,
     chain: Chain,
     actuators: usize,
+}
+
+impl Creep {
+    /// What the elements follow (V).
+    fn aim(&self, volts: f64) -> f64 {
+        if self.exponent == 0.0 { volts } else { volts * (volts / 1000.0).abs().powf(self.exponent) }
+    }
 }
 
 /// Most elements in a saved state: four in each of 50 decades.
 const MOST_ELEMENTS: f64 = 200.0;
 
 impl SignalStage for Creep {
-    /// All creep has happened at rest: q_j = V.
+    /// All creep has happened at rest: q_j = V·|V/1 kV|^e.
     fn settle(&mut self, volts: &mut [f64]) {
-        self.behind.iter_mut().for_each(|q| q.copy_from_slice(volts));
         let whole: f64 = self.elements.iter().map(|[_, weight]| weight).sum();
-        volts.iter_mut().for_each(|v| *v *= 1.0 + whole);
+        for (i, volts) in volts.iter_mut().enumerate() {
+            let aim = self.aim(*volts);
+            self.behind.iter_mut().for_each(|q| q[i] = aim);
+            *volts += whole * aim;
+        }
     }
 
     fn pass(&mut self, dt: f64, volts: &mut [f64]) {
         for (i, volts) in volts.iter_mut().enumerate() {
-            let mut crept = 0.0;
+            let (mut crept, aim) = (0.0, self.aim(*volts));
             for ([time, weight], q) in self.elements.iter().zip(&mut self.behind) {
                 let steps = dt / time;
                 let gone = -(-steps).exp_m1();
-                let away = q[i] - *volts;
-                crept += weight * (*volts + away * gone / steps);
-                q[i] = *volts + away * (1.0 - gone);
+                let away = q[i] - aim;
+                crept += weight * (aim + away * gone / steps);
+                q[i] = aim + away * (1.0 - gone);
             }
             *volts += crept;
         }
@@ -200,7 +228,7 @@ mod tests {
     #[test]
     fn a_step_grows_by_the_same_amount_in_every_decade() {
         let Action::Voltages(make) = CREEP.action else { unreachable!() };
-        let mut creep = make(&[0.02, 0.0, 1.0, 0.1, 0.0], 1, 100.0);
+        let mut creep = make(&[0.02, 0.0, 1.0, 0.1, 0.0, 0.0], 1, 100.0);
         creep.settle(&mut [0.0]);
         let (dt, mut at) = (1e-3, Vec::new());
         for step in 1..=30_000 {
@@ -233,15 +261,41 @@ mod tests {
             }
             found
         };
-        let fine = at(&[0.02, 0.0, 4.0, 0.01, 0.0], &[300, 3_000, 30_000]);
+        let fine = at(&[0.02, 0.0, 4.0, 0.01, 0.0, 0.0], &[300, 3_000, 30_000]);
         // Four elements a decade: no ripple to speak of.
         assert!(fine.windows(2).all(|pair| (pair[1] - pair[0] - 20.0).abs() < 0.02), "{fine:?}");
         // w = c/r·T^p over elements that are dense in log T: c·Γ(1 − p)/(p ln 10)·t^p but for a constant.
-        let power = at(&[0.02, 0.3, 4.0, 0.01, 0.0], &[300, 3_000, 30_000]);
+        let power = at(&[0.02, 0.3, 4.0, 0.01, 0.0, 0.0], &[300, 3_000, 30_000]);
         let ratio = (power[2] - power[1]) / (power[1] - power[0]);
         assert!((ratio / 10_f64.powf(0.3) - 1.0).abs() < 0.01, "{power:?}");
         // One element: 1 − exp(−t/T).
-        let single = at(&[0.02, 0.0, 0.0, 2.0, 0.0], &[2_000]);
+        let single = at(&[0.02, 0.0, 0.0, 2.0, 0.0, 0.0], &[2_000]);
         assert!((single[0] - 20.0 * -(-1.0_f64).exp_m1()).abs() < 0.01, "{single:?}");
+    }
+
+    #[test]
+    fn creep_with_an_exponent_grows_faster_than_the_voltage_and_is_odd() {
+        let Action::Voltages(make) = CREEP.action else { unreachable!() };
+        let crept = |exponent: f64, step: f64| {
+            let mut creep = make(&[0.02, 0.0, 1.0, 0.1, 0.0, exponent], 1, 100.0);
+            creep.settle(&mut [0.0]);
+            let mut volts = [0.0];
+            for _ in 0..3_000 {
+                volts = [step];
+                creep.pass(1e-3, &mut volts);
+            }
+            volts[0] - step
+        };
+        // Of a step of 1 kV it is the same for all exponents; of a half of it (1/2)^(1 + e) as much.
+        for exponent in [0.0, 0.7, 2.0] {
+            assert!((crept(exponent, 1000.0) / crept(0.0, 1000.0) - 1.0).abs() < 1e-12);
+            let ratio = crept(exponent, -500.0) / crept(exponent, 1000.0);
+            assert!((ratio + 0.5_f64.powf(1.0 + exponent)).abs() < 1e-12, "{exponent}: {ratio}");
+        }
+        // At rest all of it has happened.
+        let (mut creep, mut settled, mut later) = (make(&[0.02, 0.0, 1.0, 0.1, 0.0, 1.0], 1, 100.0), [500.0], [500.0]);
+        creep.settle(&mut settled);
+        creep.pass(1e-3, &mut later);
+        assert!((settled[0] - later[0]).abs() < 1e-9 && settled[0] > 500.0, "{settled:?} {later:?}");
     }
 }
