@@ -31,7 +31,7 @@ impl Phase {
             Self::Plain => 4000.0,
             Self::WithFaults => 6000.0,
             Self::Naming => 8000.0,
-            Self::ByNames => 10000.0,
+            Self::ByNames => 11500.0,
         }
     }
 

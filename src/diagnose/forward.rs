@@ -198,7 +198,12 @@ impl Search<'_> {
         (self.progress)("screening all candidates");
         // Other laws of a cause are tried once it is adopted.
         let is_by_names = matches!(self.phase, Phase::Naming | Phase::ByNames);
-        let screened = self.screen_of(from, |candidate| !(candidate.is_variant || (candidate.is_free_form && is_by_names)))?;
+        let is_of_places = |candidate: &Candidate| {
+            self.places.as_ref().is_none_or(|wanted| candidate.places.iter().any(|place| wanted.contains(place)))
+        };
+        let is_wanted =
+            |candidate: &Candidate| is_of_places(candidate) && !(candidate.is_variant || (candidate.is_free_form && is_by_names));
+        let screened = self.screen_of(from, is_wanted)?;
         let (free, named): (Vec<_>, Vec<_>) = screened.ranked.iter().partition(|(_, model)| self.ends_free(model));
         let most = screened.ranked.first().map_or(0.0, |(gain, _)| *gain);
         let most_free = free.first().map_or(0.0, |(gain, _)| *gain);

@@ -123,6 +123,8 @@ pub struct Search<'a> {
     pub limits: [f64; 2],
     /// The phase that is under way; no free form is a candidate in those by names.
     pub(super) phase: Phase,
+    /// The places of which candidates are added; none for all.
+    pub(super) places: Option<Vec<&'static str>>,
     /// Receives the current task, in words.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
@@ -210,7 +212,7 @@ impl<'a> Search<'a> {
     /// A search that has not begun yet.
     pub fn new(plant: &'a dyn Plant, split: Split, progress: &'a (dyn Fn(&str) + Sync)) -> Self {
         let estimator = Estimator::new(plant);
-        Self { estimator, split, progress, unexplained: 0.0, limits: [f64::INFINITY; 2], phase: Phase::Plain }
+        Self { estimator, split, progress, unexplained: 0.0, limits: [f64::INFINITY; 2], phase: Phase::Plain, places: None }
     }
 }
 
