@@ -20,7 +20,7 @@
 //! * `voltage_exponent` (–): exponent e with which creep grows faster than the voltage
 //!
 //! # Source
-//! Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.
+//! Physik Instrumente, piezo tutorial; creep of soft PZT (power law, larger near the coercive field) and of LIPCA benders: Beck et al.; lag and power of the voltage derived.
 
 use crate::effects::{Action, Effect, Fitting, Form, Kind, Parameter, Place, SignalStage, fits};
 
@@ -30,7 +30,7 @@ pub const CREEP: Effect = Effect {
     kind: Kind::Actuation,
     cause: "Domains keep switching slowly after a change of voltage.",
     equation: "θ_V = −γ·ℓ·(V + Σ w_j q_j),  q̇_j = (V·|V/1 kV|^e − q_j)/T_j,  T_j = T_0·10^(j/r),  w_j = c/r·(T_j/1 s)^p",
-    source: "Physik Instrumente, piezo tutorial; creep of soft PZT (power law) and of LIPCA benders: Beck et al.; lag derived.",
+    source: "Physik Instrumente, piezo tutorial; creep of soft PZT (power law, larger near the coercive field) and of LIPCA benders: Beck et al.; lag and power of the voltage derived.",
     parameters: &[
         Parameter {
             name: "per_decade",
