@@ -68,10 +68,11 @@ fn weighed(
     let without = search.ranked_at_its_spread(&search.without(best, index)?)?;
     let mut tied_with = ties.of(search, best, index);
     let without_it = search.screened(&without, responses, Some(index));
-    let kinds = search.left_to_faults(best, &without);
+    let own = comes_back(search, best, &without);
+    // One that takes much beside faults needs nothing else, and with those held off it may drown in what they do.
+    let kinds = if own < MINOR_MISFIT { search.left_to_faults(best, &without) } else { Vec::new() };
     let (own, standing) = if kinds.is_empty() {
-        let standing = standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index));
-        (comes_back(search, best, &without), standing)
+        (own, standing(search, [(best, screened), (&without, &without_it)], index, &ties.rivals_of(index)))
     } else {
         // Faults would do its work: what it takes shows where they are held off, and so does what others would take.
         let [best, without] = [best, &without].map(|scored| search.without_faults(scored, &kinds));
