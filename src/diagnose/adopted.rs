@@ -271,7 +271,6 @@ struct Needed {
 /// are not minor together. The least needed are left out first.
 fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec<usize>) -> Vec<Needed> {
     let candidate_of = |index: &usize| best.model().terms[*index].candidate;
-    let count = search.estimator.count(&search.split.all()) as f64;
     let (mut needed, mut rest, mut left_out) = (Vec::new(), best.clone(), Vec::new());
     // One alone is as small as it is.
     if small.len() == 1 {
@@ -285,13 +284,13 @@ fn needed_together(search: &Search, best: &Scored, whole: &Whole, mut small: Vec
     // Another term does a term's work if much comes back without the two.
     let is_instead = |other: &usize, index: usize| {
         let both = without(best, other).and_then(|rest| without(&rest, &index));
-        both.is_none_or(|both| search.chi2(&both) - search.chi2(best) >= MINOR_MISFIT * count)
+        both.is_none_or(|both| comes_back(search, best, &both) >= MINOR_MISFIT)
     };
     while !small.is_empty() {
         let shorter = small.iter().enumerate().filter_map(|(at, index)| Some((at, without(&rest, index)?)));
         let Some((at, least)) = shorter.min_by(|a, b| a.1.total().total_cmp(&b.1.total())) else { break };
         let index = small.remove(at);
-        let own = (search.chi2(&least) - search.chi2(&rest)).max(0.0) / count;
+        let own = comes_back(search, &rest, &least);
         if own >= MINOR_MISFIT && whole.share(search, best, index, own) > MINOR_SHARE {
             let is_one = left_out.len() == 1;
             let instead = left_out.iter().copied().filter(|other| is_one || is_instead(other, index)).collect();
