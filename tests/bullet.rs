@@ -76,9 +76,9 @@ fn wrong_lengths_steps_and_foreign_bodies_are_errors() {
     assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, -1.0, 0.0, 500.0).is_err());
     assert!(world.add_sprung_constraint(body, [0.0; 3], 1e-7, 0.0, -1.0, 500.0).is_err());
     assert!(world.add_sprung_constraint(body, [f64::NAN; 3], 1e-7, 0.0, 0.0, 500.0).is_err());
-    assert!(world.add_bent_constraint(body, [0.0; 3], 0.0, [1e-7; 4], 0.0, 500.0).is_err());
-    assert!(world.add_bent_constraint(body, [0.0; 3], 1e4, [0.0; 4], 0.0, 500.0).is_err());
-    assert!(world.add_bent_constraint(body, [0.0; 3], 1e4, [1e-7; 4], f64::NAN, 500.0).is_err());
+    assert!(world.add_bent_constraint(body, [0.0; 3], 0.0, [1e-7; 7], 0.0, 500.0).is_err());
+    assert!(world.add_bent_constraint(body, [0.0; 3], 1e4, [0.0; 7], 0.0, 500.0).is_err());
+    assert!(world.add_bent_constraint(body, [0.0; 3], 1e4, [1e-7; 7], f64::NAN, 500.0).is_err());
     assert!(matches!(other.add_sprung_constraint(foreign, [0.0; 3], 1e-7, 0.0, 0.0, 500.0), Err(BulletError::Refused(_))));
     assert_eq!(world.add_forces(body, &[Wrench::default()]), Err(BulletError::Length { what: "forces", found: 1, needed: 2 }));
     assert!(world.add_forces(body, &[Wrench { force: [f64::NAN; 3], torque: [0.0; 3] }; 2]).is_err());

@@ -471,8 +471,15 @@ fn a_run_with_memory_goes_on_from_a_saved_state_with_the_same_bits() {
 }
 
 /// The weights of `free-clamp`.
-const COMPLIANCES: [&str; 4] =
-    ["compliance_1_rad_per_n_m", "compliance_2_rad_per_n_m", "compliance_3_rad_per_n_m", "compliance_4_rad_per_n_m"];
+const COMPLIANCES: [&str; 7] = [
+    "compliance_1_rad_per_n_m",
+    "compliance_2_rad_per_n_m",
+    "compliance_3_rad_per_n_m",
+    "compliance_4_rad_per_n_m",
+    "compliance_5_rad_per_n_m",
+    "compliance_6_rad_per_n_m",
+    "compliance_7_rad_per_n_m",
+];
 
 /// Largest distance between the right ends of two runs (cm).
 fn apart(a: &Run, b: &Run) -> f64 {
@@ -507,8 +514,7 @@ fn free_forms_hold_the_named_laws_of_their_places() {
     let below = ["below_1_v", "below_2_v", "below_3_v", "below_4_v", "below_5_v", "below_6_v", "below_7_v", "below_8_v"];
     let ends = [("low_v", -1000.0), ("high_v", 0.0)];
     let line: Vec<_> = (0..8).map(|k| (below[k], -100.0 * (k + 1) as f64 / 8.0)).chain(ends).collect();
-    let soft = |c: f64| [1, 2, 3, 4].map(|k| (COMPLIANCES[k - 1], c));
-    let [s1, s2, s3, s4] = soft(0.7);
+    let [s1, s2, s3, s4, s5, s6, s7] = COMPLIANCES.map(|name| (name, 0.7));
     let cases: [(Effects, Effects); 16] = [
         (
             &[(
@@ -517,9 +523,9 @@ fn free_forms_hold_the_named_laws_of_their_places() {
             )],
             &[("stiffness", &[("scale", 1.2)])],
         ),
-        (&[("free-clamp", &[s1, s2, s3, s4])], &[("clamp-compliance", &[("compliance_rad_per_n_m", 0.7)])]),
+        (&[("free-clamp", &[s1, s2, s3, s4, s5, s6, s7])], &[("clamp-compliance", &[("compliance_rad_per_n_m", 0.7)])]),
         (
-            &[("free-clamp", &[s1, s2, s3, s4, ("damping_s", 3e-3), ("range_mn_m", 1.0)])],
+            &[("free-clamp", &[s1, s2, s3, s4, s5, s6, s7, ("damping_s", 3e-3), ("range_mn_m", 1.0)])],
             &[("clamp-compliance", &[("compliance_rad_per_n_m", 0.7), ("damping_s", 3e-3)])],
         ),
         (
@@ -568,12 +574,15 @@ fn a_clamp_of_any_curve_turns_by_the_compliance_up_to_its_moment() {
     let moment = 4.804359999999999 * 980.0 * 5.0;
     let stiff = tip(&run(CANTILEVER, &rest));
     for (compliances, range) in [([0.2, 1.0, 0.4, 0.1], 3.0), ([0.0, 0.0, 0.0, 1.0], 3.0), ([1.0, 0.0, 0.0, 0.0], 2.0)] {
-        let values: Vec<_> = COMPLIANCES.into_iter().zip(compliances).chain([("range_mn_m", range)]).collect();
+        // The weight turns the root down, which is negative; upwards the clamp gives far more, which must not count.
+        let [at_0, below @ ..] = compliances;
+        let of_all = below.into_iter().rev().chain([at_0, 3.0, 3.0, 3.0]);
+        let values: Vec<_> = COMPLIANCES.into_iter().zip(of_all).chain([("range_mn_m", range)]).collect();
         let soft = tip(&run(&with(CANTILEVER, "free-clamp", &values), &rest));
         // The integral of the compliance up to the moment of the weight, in a thousand parts.
         let parts = 1000;
         // A compliance of less than a thousandth of the largest counts as that.
-        let compliances = compliances.map(|c: f64| c.max(1e-3));
+        let compliances = compliances.map(|c: f64| c.max(3e-3));
         let at = |k: f64| {
             let point = (moment * k / 1000.0 / (1e4 * range / 3.0)).min(3.0);
             let [low, high] = [point.floor(), point.ceil()].map(|of| compliances[of as usize]);
@@ -712,8 +721,8 @@ fn the_clamps_curve_is_linear_in_its_weights_near_a_rigid_clamp() {
         moved.iter().zip(&plain).map(|(a, b)| a - b).collect()
     };
     let error = |size: f64| {
-        let sum = [0, 1, 2, 3].map(|k| change(&[(k, size)]));
-        let whole = change(&[0, 1, 2, 3].map(|k| (k, size)));
+        let sum = [0, 1, 2, 3, 4, 5, 6].map(|k| change(&[(k, size)]));
+        let whole = change(&[0, 1, 2, 3, 4, 5, 6].map(|k| (k, size)));
         let largest = whole.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
         let apart = |at: usize| (sum.iter().map(|of| of[at]).sum::<f64>() - whole[at]).abs();
         (0..whole.len()).map(apart).fold(0.0, f64::max) / largest

@@ -162,7 +162,7 @@ fn a_free_form_is_written_with_lists() {
     for (id, key, weights) in [
         ("free-moment-of-rate", "moment_mn_m", vec![0.1, 0.2, 0.3, 0.4, 0.5]),
         ("free-joint-friction", "moment_mn_m", vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6]),
-        ("free-clamp", "compliance_rad_per_n_m", vec![0.1, 0.2, 0.3, 0.4, 0.002]),
+        ("free-clamp", "compliance_rad_per_n_m", vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.002]),
     ] {
         let candidate = plant.candidates().iter().position(|c| c.id == id).unwrap();
         let model = Model::new(vec![Term { candidate, x: weights.clone() }], 3.0, true);

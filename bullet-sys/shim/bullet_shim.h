@@ -114,11 +114,11 @@ int32_t bs_fixed_constraint_add(bs_world *world, int32_t body, double max_impuls
 int32_t bs_sprung_constraint_add(bs_world *world, int32_t body, const double *pivot, double compliance, double damping_time, double hardening,
                                  double max_impulse, char *error, int32_t error_length);
 
-/* Points of a clamp's curve. */
-#define BS_CLAMP_POINTS 4
+/* Points of a clamp's curve, the middle one at no moment. */
+#define BS_CLAMP_POINTS 7
 
 /* The same with a compliance that depends on the moment: `compliances` (BS_CLAMP_POINTS values, rad/(dyn cm), positive) at the multiples of
- * `width` (dyn cm) from 0, linear between them and constant beyond; the turn is the integral of the compliance over the moment. */
+ * `width` (dyn cm) from -3 to 3, linear between them and constant beyond; the turn is the integral of the compliance over the moment. */
 int32_t bs_bent_constraint_add(bs_world *world, int32_t body, const double *pivot, double width, const double *compliances, double damping_time,
                                double max_impulse, char *error, int32_t error_length);
 

@@ -32,9 +32,10 @@ void FixedConstraint::bend(btScalar width, const btScalar *compliances) {
 }
 
 void FixedConstraint::moment_of(btScalar turn, btScalar *moment, btScalar *compliance) const {
+  const int middle = BS_CLAMP_POINTS / 2, side = turn < 0 ? -1 : 1;
   btScalar rest = std::abs(turn), below = 0;
-  for (int i = 0; i + 1 < BS_CLAMP_POINTS; ++i) {
-    const btScalar low = compliances_[i], high = compliances_[i + 1], whole = btScalar(0.5) * (low + high) * width_;
+  for (int i = 0; i < middle; ++i) {
+    const btScalar low = compliances_[middle + side * i], high = compliances_[middle + side * (i + 1)], whole = btScalar(0.5) * (low + high) * width_;
     if (rest < whole) {
       // The smaller root of low m + (high - low) m^2 / (2 width) = rest; the root is the compliance there.
       const btScalar square = low * low + 2 * (high - low) / width_ * rest;
@@ -45,7 +46,7 @@ void FixedConstraint::moment_of(btScalar turn, btScalar *moment, btScalar *compl
     rest -= whole;
     below += width_;
   }
-  *compliance = compliances_[BS_CLAMP_POINTS - 1];
+  *compliance = compliances_[middle + side * middle];
   *moment = std::copysign(below + rest / *compliance, turn);
 }
 

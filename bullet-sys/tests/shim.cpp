@@ -260,7 +260,7 @@ void misuse() {
   CHECK(bs_constraint_shift_set(w, 1, 1e-6, NOT_A_NUMBER, nullptr, 0) == BS_ERROR_ARGUMENT);
   CHECK(bs_constraint_shift_set(w, 1, 1e-6, 0, nullptr, 0) == BS_ERROR_ARGUMENT);  // a body that nothing ties
   CHECK(sprung(w, world.crate, at, 1e-6, 1) == BS_ERROR_ARGUMENT);  // a body without links
-  const double soft[BS_CLAMP_POINTS] = {1e-6, 1e-6, 1e-6, 1e-6}, rigid[BS_CLAMP_POINTS] = {1e-6, 0, 1e-6, 1e-6};
+  const double soft[BS_CLAMP_POINTS] = {1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6}, rigid[BS_CLAMP_POINTS] = {1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 0, 1e-6};
   auto bent = [&](const double *pivot, double width, const double *compliances, double damping, double impulse) {
     return bs_bent_constraint_add(w, 3, pivot, width, compliances, damping, impulse, nullptr, 0);
   };
@@ -455,7 +455,7 @@ void beyond_plain_boxes() {
   CHECK(bs_sprung_constraint_add(harder.handle, body, pivot, 1e-7, 0, 100, 1e6, nullptr, 0) == BS_OK);
   CHECK(restore(harder, hung) == BS_ERROR_SNAPSHOT);
   World bent(settings());
-  const double compliances[BS_CLAMP_POINTS] = {1e-7, 1e-7, 1e-7, 1e-7};
+  const double compliances[BS_CLAMP_POINTS] = {1e-7, 1e-7, 1e-7, 1e-7, 1e-7, 1e-7, 1e-7};
   CHECK(bs_multibody_add(bent.handle, &crate, &link, 1, high, &body, nullptr, 0) == BS_OK);
   CHECK(bs_bent_constraint_add(bent.handle, body, pivot, 1e4, compliances, 0, 1e6, nullptr, 0) == BS_OK);
   CHECK(restore(bent, hung) == BS_ERROR_SNAPSHOT);

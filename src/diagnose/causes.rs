@@ -25,6 +25,9 @@ const LIKELIER: f64 = 4.0;
 const REPLACEMENTS: usize = 4;
 const MOST_REPLACED: usize = 2;
 
+/// Free forms that are fitted to the end in the place of several terms.
+const FREE_FORMS: usize = 2;
+
 /// Result of the search.
 pub(super) struct Causes {
     /// The model with all causes, after the final refit.
@@ -136,6 +139,7 @@ pub(super) fn find(search: &mut Search, calibrated: &Scored, is_insufficient: bo
     if follows_single_runs(search, &causes.best, calibrated)? {
         return by_names(search, calibrated, &causes.best, before, is_insufficient);
     }
+    one_free_form(search, &mut causes, calibrated)?;
     Ok(causes)
 }
 
@@ -187,8 +191,8 @@ fn follows_single_runs(search: &Search, best: &Scored, calibrated: &Scored) -> R
     if !has_free_forms(search, best) || Unseen::by(search) == JudgedBy::JudgeRuns {
         return Ok(false);
     }
-    let unseen = |scored: &Scored| Unseen::of(search, scored, &[], &[]);
-    Ok(unseen(&smoothed(search, best.clone()))?.is_worse_than(&unseen(calibrated)?))
+    let missed = |scored: &Scored| Unseen::missed(search, scored.model());
+    Ok(missed(&smoothed(search, best.clone()))? > missed(calibrated)?)
 }
 
 fn has_free_forms(search: &Search, scored: &Scored) -> bool {
@@ -207,6 +211,57 @@ fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Res
     let best = with_further_names(search, best, &causes.best)?;
     (causes.best, causes.replaced) = replace(search, best, resolution)?;
     Ok(())
+}
+
+/// A free form of a cause's place in the stead of the names there and of what else it makes needless, if that costs less, with fine time steps, and does not follow single runs:
+/// a further cause, or a constant, may stand for what the law of the first one does not follow.
+fn one_free_form(search: &mut Search, causes: &mut Causes, calibrated: &Scored) -> Result<(), DiagnoseError> {
+    let best = &causes.best;
+    if best.model().terms.len() < 2 || has_free_forms(search, best) || search.phase == Phase::ByNames || !search.may_go_on() {
+        return Ok(());
+    }
+    (search.progress)("a free form in the place of several terms");
+    let most = search.cost(best) - LEAST_COST;
+    let terms = best.model().terms.len();
+    let open = |open: Scored| search.backward(search.resolve(open, Convergence::Rank)).ok();
+    let is_one = |open: &Scored| has_free_forms(search, open) && open.model().terms.len() < terms && search.cost(open) < most;
+    let mut forms = in_place_of_names(search, best)?;
+    forms.sort_by(|a, b| a.total().total_cmp(&b.total()));
+    let forms = forms.into_iter().take(FREE_FORMS).filter_map(open).filter(is_one);
+    let Some(open) = forms.min_by(|a, b| search.cost(a).total_cmp(&search.cost(b))) else { return Ok(()) };
+    let is_wanted = |search: &Search, open: &Scored| {
+        search.cost(open) < most && !follows_single_runs(search, open, calibrated).unwrap_or(true)
+    };
+    let Some(open) = search.settled_if(open, is_wanted) else { return Ok(()) };
+    let Some(free) = open.model().terms.iter().find(|term| search.candidate(term).is_free_form).cloned() else { return Ok(()) };
+    causes.open = search.above(&open);
+    let Naming { best, nearest } = naming::alone(search, open, free)?;
+    causes.nearest = nearest;
+    let coarse = search.ranked(&Model { fine: false, ..best.model().clone() })?;
+    causes.replaced = replacements(search, &coarse, Vec::new());
+    causes.best = best;
+    Ok(())
+}
+
+/// A model with a free form of each place of its named causes in the stead of these, where it may do their work.
+fn in_place_of_names(search: &Search, best: &Scored) -> Result<Vec<Scored>, DiagnoseError> {
+    let is_named = |term: &Term| !search.candidate(term).is_constant;
+    let mut found = Vec::new();
+    for (candidate, form) in search.estimator.plant.candidates().iter().enumerate().filter(|(_, form)| form.is_free_form) {
+        let is_of_place = |term: &Term| is_named(term) && naming::is_of(search, &Term { candidate, x: Vec::new() }, term);
+        let mut rest = best.model().clone();
+        rest.terms.retain(|term| !is_of_place(term));
+        if rest.terms.len() == best.model().terms.len() {
+            continue;
+        }
+        let bare = search.ranked_at_its_spread(&search.with_constants(&rest))?;
+        let screened = search.screen_of(&bare, |candidate| candidate.id == form.id)?;
+        let least = PROMISING_IN_PLACE * (bare.total() - best.total());
+        let promising = screened.ranked.first().filter(|(gain, _)| *gain >= least);
+        // What cannot be simulated is none.
+        found.extend(promising.and_then(|(_, model)| search.ranked_beyond(model, &screened).ok()));
+    }
+    Ok(found)
 }
 
 /// The model `named` with further causes where it leaves what one would see, if with these it costs no more than the model with free forms did, or hardly more: a free form
@@ -522,6 +577,36 @@ mod tests {
             let found = by_names(&mut search, &calibrated, &open, before, false).unwrap().best;
             let ids: Vec<&str> = found.model().terms.iter().map(|term| search.id(term.candidate)).collect();
             assert_eq!(ids, expected, "{place}");
+        }
+    }
+
+    #[test]
+    fn one_free_form_takes_the_place_of_names_that_cost_more() {
+        // The free form of the first one's place does what both do, with one number; the second one does it nearly.
+        for (hidden, is_by_names, expected) in [
+            (vec![("between", 3.0)], false, vec!["between"]),
+            (vec![("between", 3.0)], true, vec!["other", "second"]),
+            (vec![("other", 3.0), ("second", -1.8)], false, vec!["other", "second"]),
+        ] {
+            let mut plant = Waves::new(&hidden);
+            plant.candidates = ["other", "second", "between"].map(candidate).to_vec();
+            plant.candidates[1].places = vec!["of another"];
+            plant.candidates[2].is_free_form = true;
+            let mut search = search(&plant);
+            let calibrated = search.calibrated(1.0).unwrap();
+            let before = search.estimator.state();
+            let mut causes = select(&mut search, &calibrated, &calibrated, true).unwrap();
+            search.estimator.restore(before);
+            let terms = [0, 1].map(|candidate| Term { candidate, x: vec![1.0] });
+            causes.best = search.fitted(&Model::new(terms.to_vec(), 1.0, true)).unwrap();
+            if is_by_names {
+                search.phase = Phase::ByNames;
+            }
+            one_free_form(&mut search, &mut causes, &calibrated).unwrap();
+            let ids: Vec<&str> = causes.best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
+            assert_eq!(ids, expected, "{hidden:?}");
+            let nearest: Vec<&str> = causes.nearest.iter().flat_map(|(_, of)| of).map(|near| near.id.as_str()).collect();
+            assert_eq!(nearest == ["other"], expected.len() == 1, "{nearest:?}");
         }
     }
 

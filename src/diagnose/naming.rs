@@ -52,10 +52,22 @@ pub fn name(search: &mut Search, open: Scored) -> Result<Naming, DiagnoseError> 
     Ok(Naming { best, nearest })
 }
 
+/// A model with a single name in the stead of its free form `free`, with nothing else beside it, if that costs no more, or hardly more; otherwise as it is.
+///
+/// # Errors
+/// [`DiagnoseError`] if a model without one of its terms cannot be simulated.
+pub(super) fn alone(search: &Search, open: Scored, free: Term) -> Result<Naming, DiagnoseError> {
+    let place = Place::of(search, open.clone(), free)?;
+    let (tried, nearest) = place.tried()?;
+    let standing = tried.into_iter().filter(|attempt| attempt.taken >= LEAST_TAKEN && place.is_as_good(attempt)).collect();
+    let nearest = vec![(search.candidate(&place.free).places.clone(), nearest)];
+    Ok(Naming { best: place.simplest(standing).map_or(open, |one| one.scored), nearest })
+}
+
 /// A free form of a model, to be replaced by names.
 struct Place<'a> {
     search: &'a Search<'a>,
-    /// The model with the free form and all constants: what the free form does in the place of a constant is not its own.
+    /// The model with the free form, and as a rule with all constants: what the free form does in the place of a constant is not its own.
     best: Scored,
     /// The free form.
     free: Term,
@@ -83,9 +95,13 @@ impl<'a> Place<'a> {
     }
 
     fn with_spread(search: &'a Search<'a>, best: &Scored, index: usize, spread: Spread) -> Result<Self, DiagnoseError> {
-        let free = best.model().terms[index].clone();
-        let mut model = search.with_constants(&Model { spread, ..best.model().clone() });
-        let best = search.fitted_at_its_spread(&model)?;
+        let model = search.with_constants(&Model { spread, ..best.model().clone() });
+        Self::of(search, search.fitted_at_its_spread(&model)?, best.model().terms[index].clone())
+    }
+
+    /// Beside the terms that the model has.
+    fn of(search: &'a Search<'a>, best: Scored, free: Term) -> Result<Self, DiagnoseError> {
+        let mut model = best.model().clone();
         let is_of_place = |term: &Term| is_of(search, &free, term) && !search.candidate(term).is_constant;
         model.terms.retain(|term| term.candidate != free.candidate && !is_of_place(term));
         (search.progress)("the place without its free form");
@@ -94,14 +110,7 @@ impl<'a> Place<'a> {
 
     /// The model with the best name or the best few, if they stand, and all names that were tried, nearest first.
     fn named(&self) -> Result<(Option<Scored>, Vec<Nearest>), DiagnoseError> {
-        let mut tried = self.single()?;
-        tried.sort_by(|a, b| b.taken.total_cmp(&a.taken));
-        let mut nearest: Vec<Nearest> = Vec::new();
-        for Attempt { name, taken, .. } in &tried {
-            if nearest.iter().all(|other| other.id != *name) {
-                nearest.push(Nearest { id: (*name).into(), left: (1.0 - taken).clamp(0.0, 1.0) });
-            }
-        }
+        let (tried, nearest) = self.tried()?;
         let (standing, others): (Vec<_>, Vec<_>) = tried.into_iter().partition(|attempt| attempt.taken >= LEAST_TAKEN);
         let standing = self.simplest(standing).map(|one| self.resolved(one));
         let found = match &standing {
@@ -115,6 +124,19 @@ impl<'a> Place<'a> {
         };
         let found = found.map(|found| found.scored);
         Ok((if found.is_some() { found } else { self.alone()? }, nearest))
+    }
+
+    /// The single names of the place, and what they leave, nearest first.
+    fn tried(&self) -> Result<(Vec<Attempt>, Vec<Nearest>), DiagnoseError> {
+        let mut tried = self.single()?;
+        tried.sort_by(|a, b| b.taken.total_cmp(&a.taken));
+        let mut nearest: Vec<Nearest> = Vec::new();
+        for Attempt { name, taken, .. } in &tried {
+            if nearest.iter().all(|other| other.id != *name) {
+                nearest.push(Nearest { id: (*name).into(), left: (1.0 - taken).clamp(0.0, 1.0) });
+            }
+        }
+        Ok((tried, nearest))
     }
 
     /// The attempt that costs the least.

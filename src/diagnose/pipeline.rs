@@ -201,7 +201,8 @@ fn decide(
             insufficient.get_or_insert_with(|| words.clone());
         }
         doubts.push(words);
-        let without = search.fitted(&model)?;
+        // What is left out may have stood in for constants.
+        let without = search.with_significant_constants(search.fitted(&model)?)?;
         let open = known(&without);
         judged = judge(search, without, bare, open, nominal_resolution)?;
     }
@@ -542,6 +543,22 @@ mod tests {
             (plant.candidates[0].is_constant, plant.tolerance) = (true, 10.0);
             let found = diagnose(&plant, "waves", &[Role::Auto; 6], Vec::new(), &|_| {}, &|_| None).unwrap().diagnosis;
             assert_eq!(found.verdict, verdict, "{}", found.summary);
+        }
+    }
+
+    #[test]
+    fn constants_are_free_once_a_cause_is_dropped_that_the_data_doubt() {
+        // Nothing of the cause is hidden.
+        for is_hidden in [true, false] {
+            let mut plant = Waves::new(&[("other", if is_hidden { 3.0 } else { 0.0 })]);
+            plant.candidates = ["late", "other"].map(candidate).to_vec();
+            plant.candidates[1].is_constant = true;
+            let search = search(&plant);
+            let best = search.fitted(&Model::new(vec![Term { candidate: 0, x: vec![1.0] }], 1.0, true)).unwrap();
+            let bare = search.fitted(&Model::new(Vec::new(), 1.0, true)).unwrap();
+            let decided = decide(&search, best, &bare, [0.0; 2], 1.0).unwrap();
+            let ids: Vec<&str> = decided.judged.best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
+            assert_eq!((ids == ["other"], ids.is_empty()), (is_hidden, !is_hidden), "{ids:?}");
         }
     }
 

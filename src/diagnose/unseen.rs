@@ -4,11 +4,12 @@
 //! in turn is left out, the causes that would not be worth it without it are left out as well, the parameters (where a cause is left out with all constants)
 //! are fitted to all other runs, and the fold is judged.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::diagnosis::JudgedBy;
-use super::fit::{Convergence, Residuals, sum_of_squares};
+use super::fit::{Convergence, Residuals, coordinates, normal_equations, sum_of_squares};
 use super::plant::Model;
 use super::search::{Scored, Search, VISIBLE};
 
@@ -57,6 +58,52 @@ impl Unseen {
         Ok(Self { runs, plain, chi2: chi2.iter().sum() })
     }
 
+    /// χ² of every fold by what the others say, to first order about the model, but for what a fold tells of more than all others together: a run near a resonance, or the only one
+    /// with so large amplitudes, is no test of that.
+    ///
+    /// ```text
+    /// χ² = Σ r² − Σ (v·Jᵀr)²/(1 + λ) over all v with λ > 1,  JᵀJ v = λ K v,  v·K v = 1,  K = Σ JᵀJ of the others + 1/scale² of each coordinate
+    /// ```
+    ///
+    /// with residuals r, about the fit to the others, and derivatives J of the fold, in σ: the sum is what a fit to all would make up for in the directions v.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] if the model cannot be simulated.
+    pub(super) fn missed(search: &Search, model: &Model) -> Result<f64, DiagnoseError> {
+        let runs = search.split.all();
+        let residuals = search.estimator.residuals_of(model, &runs)?;
+        if model.terms.is_empty() {
+            return Ok(residuals.iter().map(|r| sum_of_squares(r)).sum());
+        }
+        let derivatives = search.estimator.derivatives(model, &runs)?;
+        let (gradient, mut information) = normal_equations(&residuals, &derivatives);
+        for (k, (term, parameter)) in coordinates(model).into_iter().enumerate() {
+            information[(k, k)] += search.candidate(&model.terms[term]).parameters[parameter].scale.powi(-2);
+        }
+        let mut sum = 0.0;
+        for fold in search.split.folds() {
+            let of_fold = |whole: &[Residuals]| -> Vec<Residuals> {
+                fold.iter().filter_map(|run| Some(whole[runs.binary_search(run).ok()?].clone())).collect()
+            };
+            let of_residuals = of_fold(&residuals);
+            let (own_gradient, own) = normal_equations(&of_residuals, &derivatives.iter().map(|of| of_fold(of)).collect());
+            let others = (&information - &own).cholesky().ok_or("derivatives that are no numbers")?;
+            let by = -others.solve(&(&gradient - &own_gradient));
+            let plain = of_residuals.iter().map(|r| sum_of_squares(r)).sum::<f64>();
+            sum += plain + 2.0 * own_gradient.dot(&by) + by.dot(&(&own * &by));
+            let lower = others.l();
+            let scaled = |columns: &DMatrix<f64>| lower.solve_lower_triangular(columns).ok_or("derivatives that are no numbers");
+            let slope = scaled(&DMatrix::from_columns(&[own_gradient + &own * by]))?;
+            let relative = scaled(&scaled(&own)?.transpose())?.symmetric_eigen();
+            for (lambda, along) in relative.eigenvalues.iter().zip(relative.eigenvectors.column_iter()) {
+                if *lambda > 1.0 {
+                    sum -= along.dot(&slope.column(0)).powi(2) / (1.0 + lambda);
+                }
+            }
+        }
+        Ok(sum)
+    }
+
     /// The model as it is found without a fold.
     fn without(
         search: &Search,
@@ -75,11 +122,6 @@ impl Unseen {
             return Ok(model);
         }
         Ok(search.estimator.fit(&model, &others, Convergence::Rank)?.model)
-    }
-
-    /// True if this model leaves more than another one.
-    pub(super) fn is_worse_than(&self, other: &Self) -> bool {
-        self.chi2 > other.chi2
     }
 
     /// True if this model leaves more than another one by more than half the noise, in χ² per value.
@@ -172,9 +214,31 @@ mod tests {
             let search = search(&plant, Split { fit: vec![0, 1], select: vec![2], judge: vec![] }, &|_| {});
             let of = |terms| Unseen::of(&search, &search.fitted(&Model::new(terms, 1.0, false)).unwrap(), &[], &[]).unwrap();
             let (mean, none) = (of(vec![Term { candidate: 0, x: vec![1.0] }]), of(Vec::new()));
-            assert!(mean.is_worse_than(&none));
             assert_eq!(mean.is_clearly_worse_than(&none, &search), is_worse, "{means:?}");
         }
+    }
+
+    #[test]
+    fn a_run_is_no_test_of_what_it_tells_more_of_than_all_others() {
+        let split = || Split { fit: vec![0, 1], select: vec![2], judge: vec![] };
+        let mean = Model::new(vec![Term { candidate: 0, x: vec![6.0] }], 1.0, false);
+        let plain = self::plant(&[3.0, 6.0, 9.0]);
+        let mut rough = self::plant(&[3.0, 6.0, 9.0]);
+        rough.signals[1..].iter_mut().for_each(|signal| signal.sigmas = vec![10.0; 4]);
+        // The mean of two runs of four values, beside that of the scale of 1 about 6: (8·7.5 + 6)/9 without the first one, 6, and (8·4.5 + 6)/9.
+        let by_others = 3.0 * 4.0 + 2.0 * 4.0 * (13.0_f64 / 3.0).powi(2);
+        // Runs with a hundredth of the weight leave the first one to itself, which tells more than these and the scale: without it the mean is 6.6/1.08. Without one
+        // of them it is (4·3 + 0.04·9 + 6)/5.04 or (4·3 + 0.04·6 + 6)/5.04.
+        let others = |by: f64, mean: f64| 0.04 * (1.0 + (by - mean).powi(2));
+        let apart = 6.6_f64 / 1.08 - 3.0;
+        let first = 4.0 + 4.0 * apart.powi(2) - (4.0 * apart).powi(2) / 5.08;
+        let of_rough = first + others(18.36 / 5.04, 6.0) + others(18.24 / 5.04, 9.0);
+        for (plant, expected) in [(&plain, by_others), (&rough, of_rough)] {
+            let found = Unseen::missed(&search(plant, split(), &|_| {}), &mean).unwrap();
+            assert!((found - expected).abs() < 1e-4 * expected, "{found} {expected}");
+        }
+        let none = Unseen::missed(&search(&plain, split(), &|_| {}), &Model::new(Vec::new(), 1.0, false)).unwrap();
+        assert!((none - (12.0 + 4.0 * (9.0 + 36.0 + 81.0))).abs() < 1e-9, "{none}");
     }
 
     #[test]

@@ -1,15 +1,17 @@
 //! The turn of a clamped root as a curve of the moment on it, linear in its weights.
 
-/// Points of the curve, at equidistant moments from 0 to its range.
-pub const CLAMP_POINTS: usize = 4;
+/// Points of the curve, at equidistant moments over its range, which is as large to either side of 0.
+pub const CLAMP_POINTS: usize = 7;
+/// Pieces of the curve to either side.
+const PIECES: usize = (CLAMP_POINTS - 1) / 2;
 /// A compliance that is less than this share of the largest one counts as that, so that every turn has one moment.
 const LEAST_SHARE: f64 = 1e-3;
 
-/// An odd curve of the turn against the moment. Its slope, the compliance, is linear between points and constant beyond the last one; no compliance is negative,
+/// A curve of the turn against the moment. Its slope, the compliance, is linear between points and constant beyond the last ones; no compliance is negative,
 /// so the curve rises everywhere.
 ///
 /// ```text
-/// φ(M) = sgn M · ∫ C(m) dm from 0 to |M|
+/// φ(M) = ∫ C(m) dm from 0 to M
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClampCurve {
@@ -23,7 +25,7 @@ impl ClampCurve {
     /// The clamp that does not turn.
     pub const RIGID: Self = Self { width: 1.0, compliances: [0.0; CLAMP_POINTS] };
 
-    /// A curve with its `compliances` (rad/(dyn·cm)) at equidistant moments from 0 to `range` (dyn·cm). Negative ones and a range that is not positive count as
+    /// A curve with its `compliances` (rad/(dyn·cm)) at equidistant moments from −`range` to `range` (dyn·cm). Negative ones and a range that is not positive count as
     /// none.
     pub fn new(range: f64, compliances: [f64; CLAMP_POINTS]) -> Self {
         let largest = compliances.into_iter().fold(0.0, f64::max);
@@ -31,7 +33,7 @@ impl ClampCurve {
             return Self::RIGID;
         }
         let compliances = compliances.map(|compliance| compliance.max(LEAST_SHARE * largest));
-        Self { width: range / (CLAMP_POINTS - 1) as f64, compliances }
+        Self { width: range / PIECES as f64, compliances }
     }
 
     /// True if the clamp does not turn.
@@ -61,10 +63,11 @@ impl ClampCurve {
 
     /// The moment M (dyn·cm) that solves φ(M) + `added`·M = `turn` (rad), with `added` in rad/(dyn·cm). One of the two must turn.
     pub fn moment(&self, turn: f64, added: f64) -> f64 {
-        let Self { width, compliances } = *self;
+        let width = self.width;
+        let at = |k: usize| self.compliances[if turn < 0.0 { PIECES - k } else { PIECES + k }] + added;
         let (mut rest, mut moment) = (turn.abs(), 0.0);
-        for pair in compliances.windows(2) {
-            let [low, high] = [pair[0] + added, pair[1] + added];
+        for k in 0..PIECES {
+            let [low, high] = [at(k), at(k + 1)];
             let whole = 0.5 * (low + high) * width;
             if rest < whole {
                 // The smaller root of low·m + (high − low)·m²/(2·width) = rest.
@@ -74,7 +77,7 @@ impl ClampCurve {
             rest -= whole;
             moment += width;
         }
-        (moment + rest / (compliances[CLAMP_POINTS - 1] + added)).copysign(turn)
+        (moment + rest / at(PIECES)).copysign(turn)
     }
 }
 
@@ -85,8 +88,12 @@ mod tests {
     /// φ(M) by the sum of trapezia, exact for a compliance that is linear between points.
     fn turn(curve: &ClampCurve, moment: f64) -> f64 {
         let Extents { at, beyond } = extents(curve, moment.abs());
-        let c = curve.compliances();
-        let mut sum = beyond * c[CLAMP_POINTS - 1];
+        let mut c = curve.compliances();
+        if moment < 0.0 {
+            c.reverse();
+        }
+        let c = &c[PIECES..];
+        let mut sum = beyond * c[PIECES];
         for (k, share) in at.into_iter().enumerate() {
             sum += curve.width() * share * (c[k] + 0.5 * share * (c[k + 1] - c[k]));
         }
@@ -94,18 +101,23 @@ mod tests {
     }
 
     struct Extents {
-        at: [f64; CLAMP_POINTS - 1],
+        at: [f64; PIECES],
         beyond: f64,
     }
 
     fn extents(curve: &ClampCurve, moment: f64) -> Extents {
         let at = std::array::from_fn(|k| (moment / curve.width() - k as f64).clamp(0.0, 1.0));
-        Extents { at, beyond: (moment - curve.width() * (CLAMP_POINTS - 1) as f64).max(0.0) }
+        Extents { at, beyond: (moment - curve.width() * PIECES as f64).max(0.0) }
     }
 
     #[test]
     fn the_moment_of_a_turn_solves_the_curve_on_every_piece() {
-        for compliances in [[1e-7, 3e-7, 2e-7, 5e-8], [0.0, 0.0, 4e-7, 0.0], [5e-7, 0.0, 0.0, 1e-7], [2e-7; 4]] {
+        for compliances in [
+            [2e-7, 0.0, 1e-7, 1e-7, 3e-7, 2e-7, 5e-8],
+            [1e-7, 1e-7, 0.0, 0.0, 0.0, 4e-7, 0.0],
+            [0.0, 0.0, 5e-7, 5e-7, 0.0, 0.0, 1e-7],
+            [2e-7; 7],
+        ] {
             let curve = ClampCurve::new(3e4, compliances);
             for added in [0.0, 1e-9, 1e-6] {
                 for k in -40..=40 {
@@ -125,7 +137,7 @@ mod tests {
         for turn in [-0.05, -1e-3, 0.0, 2e-3, 0.2] {
             assert!((line.moment(turn, 0.0) - turn / 3e-7).abs() <= 1e-14 * (turn / 3e-7).abs(), "{turn}");
         }
-        for curve in [ClampCurve::new(2e4, [0.0; 4]), ClampCurve::new(0.0, [1e-7; 4]), ClampCurve::new(f64::NAN, [1e-7; 4])] {
+        for curve in [ClampCurve::new(2e4, [0.0; 7]), ClampCurve::new(0.0, [1e-7; 7]), ClampCurve::new(f64::NAN, [1e-7; 7])] {
             assert!(curve.is_rigid());
         }
     }
