@@ -98,7 +98,10 @@ impl BulletEngine {
         match (robot.mount, extensions.curved_clamp()) {
             (Mount::Clamped, Some(curve)) => {
                 let (width, damping) = (curve.width(), extensions.clamp_damping);
-                world.add_bent_constraint(body, left_end, width, curve.compliances(), damping, CLAMP_IMPULSE)?;
+                // A turn about y lowers the free end, which is negative for the curve.
+                let mut compliances = curve.compliances();
+                compliances.reverse();
+                world.add_bent_constraint(body, left_end, width, compliances, damping, CLAMP_IMPULSE)?;
             }
             (Mount::Clamped, None) if extensions.clamp_compliance > 0.0 => {
                 world.add_sprung_constraint(
