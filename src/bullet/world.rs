@@ -179,8 +179,8 @@ impl World {
         self.add_tie(body, pivot, &Tie::Sprung { compliance, hardening }, damping_time, max_impulse)
     }
 
-    /// The same with a compliance that depends on the moment: `compliances` (rad/(dyn·cm)) at the multiples of `width` (dyn·cm) from 0, linear between
-    /// them and constant beyond. The turn is the integral of the compliance over the moment.
+    /// The same with a compliance that depends on the moment: `compliances` (rad/(dyn·cm)) at the multiples of `width` (dyn·cm) from −3 to 3, linear
+    /// between them and constant beyond, positive about y. The turn is the integral of the compliance over the moment.
     ///
     /// # Errors
     /// As [`add_sprung_constraint`](Self::add_sprung_constraint); also for a width that is not positive.
