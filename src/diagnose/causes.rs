@@ -213,8 +213,8 @@ fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Res
     Ok(())
 }
 
-/// A free form of a cause's place in the stead of the names there and of what else it makes needless, if that costs less, with fine time steps, and does not follow single runs:
-/// a further cause, or a constant, may stand for what the law of the first one does not follow.
+/// A free form of a cause's place in the stead of the names there and of what else it makes needless, if that costs less, with fine time steps, leaves less than half of what names
+/// leave above the noise, and does not follow single runs: a further cause, or a constant, may stand for what the law of the first one does not follow.
 fn one_free_form(search: &mut Search, causes: &mut Causes, calibrated: &Scored) -> Result<(), DiagnoseError> {
     let best = &causes.best;
     if best.model().terms.len() < 2 || has_free_forms(search, best) || search.phase == Phase::ByNames || !search.may_go_on() {
@@ -224,7 +224,10 @@ fn one_free_form(search: &mut Search, causes: &mut Causes, calibrated: &Scored) 
     let most = search.cost(best) - LEAST_COST;
     let terms = best.model().terms.len();
     let open = |open: Scored| search.backward(search.resolve(open, Convergence::Rank)).ok();
-    let is_one = |open: &Scored| has_free_forms(search, open) && open.model().terms.len() < terms && search.cost(open) < most;
+    let is_one = |open: &Scored| {
+        let takes_what_is_left = search.above(best) > 2.0 * search.above(open);
+        has_free_forms(search, open) && open.model().terms.len() < terms && search.cost(open) < most && takes_what_is_left
+    };
     let mut forms = in_place_of_names(search, best)?;
     forms.sort_by(|a, b| a.total().total_cmp(&b.total()));
     let forms = forms.into_iter().take(FREE_FORMS).filter_map(open).filter(is_one);
@@ -483,9 +486,9 @@ fn fewer_for_all(search: &mut Search, best: &Scored) -> Result<Option<Scored>, D
     settled.map(|settled| search.backward(settled)).transpose()
 }
 
-/// The model `best`, or one with another cause in the place of one of its own that leaves less. What tells a delay from a lag of the driver may be less than what the
-/// time steps of the search are wrong by, or the number of joints that suits one of the two: those that differ by no more are refitted with fine steps, each in the
-/// discretisation that suits it.
+/// The model `best`, one with another law of a cause in the place of that cause and a constant that leaves hardly more, or one with another cause in the place of one of its own that
+/// leaves less. What tells a delay from a lag of the driver, or a damping beside a quadratic drag from a linear part of the drag, may be less than what the time steps of the search
+/// are wrong by, or the number of joints that suits one of the two: those that differ by no more are refitted with fine steps, each in the discretisation that suits it.
 fn least_with_fine_steps(search: &Search, best: Scored, causes: &mut Causes) -> Scored {
     let is_near = |other: &&Replacement| {
         search.id(other.removed) != search.id(other.trial.candidate)
@@ -501,8 +504,18 @@ fn least_with_fine_steps(search: &Search, best: Scored, causes: &mut Causes) -> 
         let excess = scored.total() - best.total();
         Some(Replacement { removed: *removed, trial: Trial { candidate: *candidate, scored }, excess })
     };
-    let others = causes.replaced.iter().filter(is_near).filter_map(fine);
-    let least = others.min_by(|a, b| a.excess.total_cmp(&b.excess)).filter(|least| least.excess < -LIKELIER);
+    let mut others: Vec<Replacement> = causes.replaced.iter().filter(is_near).filter_map(fine).collect();
+    others.sort_by(|a, b| a.excess.total_cmp(&b.excess));
+    let is_shorter = |other: &Replacement| other.trial.scored.model().terms.len() < best.model().terms.len();
+    if let Some(at) = others.iter().position(|other| is_shorter(other) && other.excess < search.tolerance()) {
+        let Replacement { removed, trial: Trial { candidate, scored }, .. } = others.swap_remove(at);
+        // What was tried in the place of the plain law is now in that of the other one.
+        let is_plain = |other: usize| search.id(other) == search.id(candidate);
+        causes.replaced.retain(|other| other.removed != removed);
+        causes.replaced.iter_mut().filter(|other| is_plain(other.removed)).for_each(|other| other.removed = candidate);
+        return scored;
+    }
+    let least = others.into_iter().next().filter(|least| least.excess < -LIKELIER);
     let Some(Replacement { removed, trial: Trial { candidate, scored }, excess }) = least else { return best };
     // The others in the place of the cause are now in that of the other one, and the cause is one of them.
     causes.replaced.retain(|other| other.removed != removed || search.id(other.trial.candidate) != search.id(candidate));
@@ -581,24 +594,26 @@ mod tests {
     }
 
     #[test]
-    fn one_free_form_takes_the_place_of_names_that_cost_more() {
-        // The free form of the first one's place does what both do, with one number; the second one does it nearly.
-        for (hidden, is_by_names, expected) in [
-            (vec![("between", 3.0)], false, vec!["between"]),
-            (vec![("between", 3.0)], true, vec!["other", "second"]),
-            (vec![("other", 3.0), ("second", -1.8)], false, vec!["other", "second"]),
+    fn one_free_form_takes_the_place_of_names_that_cost_more_and_leave_something() {
+        // The free form of the first one's place does what the first two do, with one number; the third one does what the second one does, nearly.
+        for (hidden, names, is_by_names, expected) in [
+            (vec![("between", 3.0)], vec![0, 2], false, vec!["between"]),
+            (vec![("between", 3.0)], vec![0, 2], true, vec!["other", "second"]),
+            (vec![("other", 3.0), ("second", -1.8)], vec![0, 2], false, vec!["other", "second"]),
+            // More names than are needed cost more, but leave nothing.
+            (vec![("between", 3.0)], vec![0, 1, 2], false, vec!["other", "first", "second"]),
         ] {
             let mut plant = Waves::new(&hidden);
-            plant.candidates = ["other", "second", "between"].map(candidate).to_vec();
-            plant.candidates[1].places = vec!["of another"];
-            plant.candidates[2].is_free_form = true;
+            plant.candidates = ["other", "first", "second", "between"].map(candidate).to_vec();
+            plant.candidates[1..3].iter_mut().for_each(|other| other.places = vec!["of another"]);
+            plant.candidates[3].is_free_form = true;
             let mut search = search(&plant);
             let calibrated = search.calibrated(1.0).unwrap();
             let before = search.estimator.state();
             let mut causes = select(&mut search, &calibrated, &calibrated, true).unwrap();
             search.estimator.restore(before);
-            let terms = [0, 1].map(|candidate| Term { candidate, x: vec![1.0] });
-            causes.best = search.fitted(&Model::new(terms.to_vec(), 1.0, true)).unwrap();
+            let terms: Vec<Term> = names.iter().map(|candidate| Term { candidate: *candidate, x: vec![1.0] }).collect();
+            causes.best = search.fitted(&Model::new(terms, 1.0, true)).unwrap();
             if is_by_names {
                 search.phase = Phase::ByNames;
             }
@@ -748,6 +763,38 @@ mod tests {
         }
     }
 
+    /// A model with what stands in the place of its causes.
+    fn with_rivals(best: &Scored, replaced: Vec<Replacement>) -> Causes {
+        Causes {
+            best: best.clone(),
+            trials: Vec::new(),
+            replaced,
+            spikes: 0,
+            share_left: 0.0,
+            unexplained: 0.0,
+            cost_with_faults: f64::INFINITY,
+            open: f64::INFINITY,
+            nearest: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn another_law_takes_the_place_of_a_plain_one_and_a_constant() {
+        // The other law of `second` has a part of `other`, and none of `late`.
+        for (constant, found) in [("other", vec![3]), ("late", vec![0, 2])] {
+            let mut plant = Waves::new(&[("second", 5.0), (constant, 1.0)]);
+            plant.candidates[0] = Candidate { is_constant: true, ..candidate(constant) };
+            let search = search(&plant);
+            let terms = [0, 2].map(|candidate| Term { candidate, x: vec![1.0] });
+            let best = search.fitted(&Model::new(terms.to_vec(), 1.0, true)).unwrap();
+            let mut causes = with_rivals(&best, search.replacements(&best, 1).unwrap());
+            let best = least_with_fine_steps(&search, best, &mut causes);
+            let candidates: Vec<usize> = best.model().terms.iter().map(|term| term.candidate).collect();
+            assert_eq!(candidates, found, "{constant}");
+            assert!(causes.replaced.iter().all(|other| candidates.contains(&other.removed)), "{constant}");
+        }
+    }
+
     #[test]
     fn near_rivals_are_compared_in_the_discretisation_that_suits_each() {
         // A resolution of 1.2 does what is missing beside either cause; without it the right one leaves more than the other one with it.
@@ -761,17 +808,7 @@ mod tests {
             let (best, other) = (fitted(2, 1.2, true), fitted(1, 1.0, false));
             let excess = other.total() - fitted(2, 1.2, false).total();
             let trial = Trial { candidate: 1, scored: other };
-            let mut causes = Causes {
-                best: best.clone(),
-                trials: Vec::new(),
-                replaced: vec![Replacement { removed: 2, trial, excess }],
-                spikes: 0,
-                share_left: 0.0,
-                unexplained: 0.0,
-                cost_with_faults: f64::INFINITY,
-                open: f64::INFINITY,
-                nearest: Vec::new(),
-            };
+            let mut causes = with_rivals(&best, vec![Replacement { removed: 2, trial, excess }]);
             let least = least_with_fine_steps(&search, best, &mut causes);
             assert_eq!((least.model().terms[0].candidate, least.model().resolution), (found, 1.2), "{hidden}");
             // The other one of the two is what stands in its place.
