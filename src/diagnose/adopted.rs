@@ -37,7 +37,7 @@ pub(super) fn estimates(search: &Search, index: usize, term: &Term, found: &Inte
                 value: free.value(x),
                 unit: free.unit.to_owned(),
                 ci95: ends.map(|end| end.is_finite().then_some(end)),
-                at_bound: x <= free.bounds[0] || x >= free.bounds[1],
+                at_bound: free.is_at_bound(x),
             }
         })
         .collect()

@@ -213,8 +213,8 @@ fn name_causes(search: &mut Search, causes: &mut Causes, resolution: f64) -> Res
     Ok(())
 }
 
-/// A free form of a cause's place in the stead of the names there and of what else it makes needless, if that costs less, with fine time steps, leaves less than half of what names
-/// leave above the noise, and does not follow single runs: a further cause, or a constant, may stand for what the law of the first one does not follow.
+/// A free form of a cause's place in the stead of the names there and of what else it makes needless, if that costs less, with fine time steps, and does not follow single runs:
+/// a further cause, or a constant, may stand for what the law of the first one does not follow. The names are at a bound of their ranges, or leave twice as much above the noise.
 fn one_free_form(search: &mut Search, causes: &mut Causes, calibrated: &Scored) -> Result<(), DiagnoseError> {
     let best = &causes.best;
     if best.model().terms.len() < 2 || has_free_forms(search, best) || search.phase == Phase::ByNames || !search.may_go_on() {
@@ -224,9 +224,12 @@ fn one_free_form(search: &mut Search, causes: &mut Causes, calibrated: &Scored) 
     let most = search.cost(best) - LEAST_COST;
     let terms = best.model().terms.len();
     let open = |open: Scored| search.backward(search.resolve(open, Convergence::Rank)).ok();
+    // A law at a bound of its range stands for another one.
+    let is_bounded = |term: &Term| term.x.iter().zip(&search.candidate(term).parameters).any(|(x, free)| free.is_at_bound(*x));
+    let are_bounded = best.model().terms.iter().any(is_bounded);
     let is_one = |open: &Scored| {
-        let takes_what_is_left = search.above(best) > 2.0 * search.above(open);
-        has_free_forms(search, open) && open.model().terms.len() < terms && search.cost(open) < most && takes_what_is_left
+        let is_wanted = are_bounded || search.above(best) > 2.0 * search.above(open);
+        has_free_forms(search, open) && open.model().terms.len() < terms && search.cost(open) < most && is_wanted
     };
     let mut forms = in_place_of_names(search, best)?;
     forms.sort_by(|a, b| a.total().total_cmp(&b.total()));
@@ -594,18 +597,20 @@ mod tests {
     }
 
     #[test]
-    fn one_free_form_takes_the_place_of_names_that_cost_more_and_leave_something() {
+    fn one_free_form_takes_the_place_of_names_that_cost_more_and_leave_something_or_are_at_a_bound() {
         // The free form of the first one's place does what the first two do, with one number; the third one does what the second one does, nearly.
-        for (hidden, names, is_by_names, expected) in [
-            (vec![("between", 3.0)], vec![0, 2], false, vec!["between"]),
-            (vec![("between", 3.0)], vec![0, 2], true, vec!["other", "second"]),
-            (vec![("other", 3.0), ("second", -1.8)], vec![0, 2], false, vec!["other", "second"]),
-            // More names than are needed cost more, but leave nothing.
-            (vec![("between", 3.0)], vec![0, 1, 2], false, vec!["other", "first", "second"]),
+        for (hidden, names, least, is_by_names, expected) in [
+            (vec![("between", 3.0)], vec![0, 2], -100.0, false, vec!["between"]),
+            (vec![("between", 3.0)], vec![0, 2], -100.0, true, vec!["other", "second"]),
+            (vec![("other", 3.0), ("second", -1.8)], vec![0, 2], -100.0, false, vec!["other", "second"]),
+            // More names than are needed cost more, but leave nothing: unless one is at a bound.
+            (vec![("between", 3.0)], vec![0, 1, 2], -100.0, false, vec!["other", "first", "second"]),
+            (vec![("between", 3.0)], vec![0, 1, 2], 0.4, false, vec!["between"]),
         ] {
             let mut plant = Waves::new(&hidden);
             plant.candidates = ["other", "first", "second", "between"].map(candidate).to_vec();
             plant.candidates[1..3].iter_mut().for_each(|other| other.places = vec!["of another"]);
+            plant.candidates[2].parameters[0].bounds[0] = least;
             plant.candidates[3].is_free_form = true;
             let mut search = search(&plant);
             let calibrated = search.calibrated(1.0).unwrap();

@@ -32,6 +32,11 @@ impl Free {
             1.0 / coordinate
         }
     }
+
+    /// True if a coordinate is at an end of its range.
+    pub fn is_at_bound(&self, coordinate: f64) -> bool {
+        coordinate <= self.bounds[0] || coordinate >= self.bounds[1]
+    }
 }
 
 /// A cause that may be added to the model.

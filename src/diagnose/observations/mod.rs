@@ -194,7 +194,7 @@ pub fn diagnose(dataset: &Dataset, progress: &(dyn Fn(&str) + Sync)) -> Result<F
                         unit: free.unit.into(),
                         ci95: [Some(ends[0].min(ends[1])), Some(ends[0].max(ends[1]))]
                             .map(|end| end.filter(|x: &f64| x.is_finite())),
-                        at_bound: term.x[0] <= free.bounds[0] || term.x[0] >= free.bounds[1],
+                        at_bound: free.is_at_bound(term.x[0]),
                     }],
                     tied_with: Vec::new(),
                     share: 1.0,
