@@ -29,14 +29,17 @@ const STEPS_PER_PERIOD: f64 = 220.0;
 const GROUND_STEP: f64 = 1e-4;
 /// Kinds of effects that do nothing at 0 V.
 const ON_VOLTAGES: [Kind; 2] = [Kind::Driver, Kind::Actuation];
+
 /// True for causes with which the joints' steps are repeated until friction agrees with its law; a cable that drags is not counted so.
 fn has_repeated_steps(candidate: &Candidate) -> bool {
     matches!(candidate.id, "dry-friction" | "free-joint-friction")
 }
+
 /// True for a law of the joints' deviation that costs half as much as the motion: with a power that is fitted, or a curve.
 fn is_elastic_law(candidate: &Candidate) -> bool {
     candidate.id == "free-moment-of-deviation" || (candidate.id == "stiffness-softening" && candidate.is_variant)
 }
+
 /// True for a limit of the voltage's rate that is approached softly: where it rounds the voltage, it is followed in parts of a time step.
 fn is_soft_limit(candidate: &Candidate) -> bool {
     candidate.id == "slew-limit" && candidate.parameters.iter().any(|free| free.name == "linear_s")
