@@ -1,4 +1,6 @@
 //! The causes of a misfit: selected without and with faults of the bench, named at their places, and refitted.
+//!
+//! The file is long because selection, naming, replacement and the final refit hand on one search with its causes; a third of it is tests of these.
 
 use super::DiagnoseError;
 use super::budget::Phase;
