@@ -135,14 +135,13 @@ impl Law for Slew {
     }
 }
 
-/// x(s) for dx/ds = −tanh(x) from x ≥ 0: sinh x falls by e^−s.
+/// x(s) for dx/ds = −tanh(x) from x ≥ 0, but for rounding near 1: sinh x falls by e^−s.
 fn approached(x: f64, s: f64) -> f64 {
     if x - s > FAR {
         return x - s;
     }
-    // Logarithm of 2 sinh x.
-    let logarithm = x - s + (-(-2.0 * x).exp()).ln_1p();
-    (0.5 * logarithm.exp()).asinh()
+    let sinh = 0.5 * ((x - s).exp() - (-x - s).exp());
+    (sinh + (sinh * sinh + 1.0).sqrt()).ln()
 }
 
 #[cfg(test)]
