@@ -5,6 +5,8 @@ of a clamped Euler-Bernoulli beam with Kelvin-Voigt damping (modal sums, small d
 
     q'' + 2 zeta w q' + w^2 q = w^2 q_static(t)     w = (beta L)^2 sqrt(EI/(m L^4))     zeta = eta w / 2
 
+or, in `dropped`, parabolas of free flight.
+
 Usage: python3 examples/measured_data.py
 """
 
@@ -123,6 +125,26 @@ def released():
         write(HERE / f"released/{name}.csv", ["t_s", "tip_z_mm"], rows)
 
 
+def dropped():
+    """Flat robots dropped on a floor that returns 0.45 of their speed, down to 2 mm/s."""
+    noise = random.Random(7)
+    for height in [4, 6, 9, 13, 16, 20]:
+        # Speeds at the floor, and when it is left.
+        speed = math.sqrt(2 * 10 * GRAVITY * height)
+        left, speeds = [speed / (10 * GRAVITY)], [0.45 * speed]
+        while speeds[-1] > 2:
+            left.append(left[-1] + 2 * speeds[-1] / (10 * GRAVITY))
+            speeds.append(0.45 * speeds[-1])
+        rows = []
+        for row in range(80):
+            t = row / 400
+            flights = [(t - at, speed) for at, speed in zip(left, speeds) if at <= t]
+            since, speed = flights[-1] if flights else (t, 0)
+            z = (0 if flights else height) + speed * since - 5 * GRAVITY * since**2
+            rows.append([f"{t:.4f}", f"{max(z, 0) + noise.gauss(0, NOISE_MM):.3f}"])
+        write(HERE / f"dropped/{height}mm.csv", ["t_s", "middle_z_mm"], rows)
+
+
 def exposure():
     """Sines filmed at 60 frames a second with an exposure of 16 ms; nothing is hidden. The voltage is logged at 250 Hz."""
     noise = random.Random(2)
@@ -170,6 +192,7 @@ if __name__ == "__main__":
     two_clocks()
     one_point()
     released()
+    dropped()
     exposure()
     frequency_response()
     slow_loops()

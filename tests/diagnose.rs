@@ -263,6 +263,12 @@ fn files_shapes_and_robots_of_a_run_are_checked_and_named_with_their_lines() {
         (released("hung_g = -1"), 2, vec!["line 13", "hung_g", "-1"]),
         (released("held = \"nose\"\nheld_z_mm = 3"), 2, vec!["line 13", "nose", "tip"]),
         (released("held = \"tip\"\nheld_z_mm = 99"), 2, vec!["line 14", "held_z_mm", "99"]),
+        (released("level = true\nheight_mm = 5"), 2, vec!["line 14", "height_mm", "mount = \"ground\""]),
+        (
+            released("level = true\nheight_mm = -5").replace("clamped", "ground"),
+            2,
+            vec!["line 14", "height_mm", "-5", "from 0 to 1000"],
+        ),
         (released("level = true\nat_s = 7"), 2, vec!["line 14", "at_s", "from 0 to 0.2"]),
         (released("level = true\nfrom = 7"), 2, vec!["line 14", "from"]),
         (released("level = true\n[run.robot]\nactuators = 2"), 2, vec!["line 15", "actuators", "a file of its own"]),

@@ -67,6 +67,14 @@ fn sheets_let_go_from_under_a_weight_and_from_level_show_their_stiffness() {
 }
 
 #[test]
+fn robots_that_are_dropped_show_what_the_floor_returns() {
+    let d = diagnosed("dropped");
+    assert_eq!((d["verdict"].as_str(), ids(&d)), (Some("named"), vec!["contact-restitution"]), "{}", d["summary"]);
+    let [value, low, high] = parameter(&d, "contact-restitution");
+    assert!((value - 0.45).abs() < 0.01 && low <= 0.45 && 0.45 <= high, "{value} {low} {high}");
+}
+
+#[test]
 #[ignore = "slow: run by scripts/test.sh"]
 fn a_voltage_of_its_own_file_is_brought_to_the_clock_of_the_camera() {
     let d = diagnosed("two_clocks");

@@ -10,7 +10,8 @@ mod ground;
 #[path = "hidden/judge.rs"]
 mod judge;
 
-use ground::{Film, Floor, INSIDE, film, hide, nominal, trace, write};
+use generator::random::Random;
+use ground::{Film, Floor, INSIDE, ROBOT, film, hide, nominal, trace, write};
 use judge::{diagnosed, holds, is_right, long, names};
 use sfers::diagnose::diagnosis::Verdict;
 use sfers::diagnose::pipeline::Outcome;
@@ -58,6 +59,30 @@ fn nothing_is_found_where_only_the_engines_differ() {
     let d = &outcome.diagnosis;
     assert_eq!((d.verdict, names(d)), (Verdict::None, vec![]));
     // Bullet's contact and the planar engine's differ by a fifth of the noise or so.
+    assert!(d.baseline.rmse_mm < 1.1 * NOISE_MM, "{}", d.baseline.rmse_mm);
+}
+
+/// `examples/dropped` is of a floor that returns something.
+#[test]
+#[ignore = "slow: run by scripts/test.sh"]
+fn nothing_is_found_where_dropped_robots_stay_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random::with_purpose(2, "camera before drops");
+    let mut text = format!("[dataset]\nname = \"drops\"\n{ROBOT}\n[markers]\nmiddle = 150.0\n[noise]\ndefault_mm = {NOISE_MM}\n");
+    for mm in [4.0, 6.0, 9.0, 13.0, 16.0, 20.0] {
+        text += &format!("\n[[run]]\nid = \"{mm} mm\"\nfile = \"{mm}.csv\"\nstart = \"released\"\n");
+        text += &format!("release = {{ level = true, height_mm = {mm} }}\n");
+        let mut table = String::from("t_s,middle_z_mm\n");
+        for row in 0..80 {
+            let t = 2.5e-3 * f64::from(row);
+            let z = f64::max(mm - 0.5 * 9800.0 * t * t, 0.0) + NOISE_MM * random.normal();
+            table += &format!("{t:.4},{z:.4}\n");
+        }
+        std::fs::write(folder.path().join(format!("{mm}.csv")), table).unwrap();
+    }
+    std::fs::write(folder.path().join("dataset.toml"), text).unwrap();
+    let d = diagnosed(folder.path()).diagnosis;
+    assert_eq!((d.verdict, names(&d)), (Verdict::None, vec![]), "{}", d.summary);
     assert!(d.baseline.rmse_mm < 1.1 * NOISE_MM, "{}", d.baseline.rmse_mm);
 }
 

@@ -199,6 +199,7 @@ pub(crate) struct RunEntry {
 pub(crate) struct Release {
     hung_g: Option<f64>,
     level: Option<bool>,
+    height_mm: Option<f64>,
     held: Option<String>,
     held_z_mm: Option<f64>,
     at_s: Option<f64>,
@@ -210,8 +211,11 @@ pub enum Start {
     /// In equilibrium under gravity and the first voltages.
     #[default]
     Settled,
-    /// All joints at zero angle.
-    Level,
+    /// All joints at zero angle, on the floor, in the clamp or in the air.
+    Level {
+        /// Height above the floor (cm).
+        height: f64,
+    },
     /// In equilibrium with a mass (g) at the right end that is taken away.
     Hung(f64),
     /// In equilibrium with the point at `position` (cm along the robot) held at the height `z` (cm) by a vertical force.

@@ -79,7 +79,7 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
     let mount = plant.robot().mount;
     config.simulation = SimulationConfig {
         engine: Some("planar".into()),
-        start: Some(if measured.start == Start::Level { "flat" } else { "settled" }.into()),
+        start: Some(if matches!(measured.start, Start::Level { .. }) { "flat" } else { "settled" }.into()),
         numerical_damping_per_s: (mount == Mount::Clamped).then_some(NUMERICAL_DAMPING),
         time_step_s: Some(StepConfig::Seconds(step)),
         steps: Some(steps),
@@ -93,7 +93,8 @@ pub fn experiment(dataset: &Dataset, plant: &RobotPlant, model: &Model, run: usi
         Start::Hung(_) | Start::Held { .. } => {
             "# The run is released from another shape; an experiment starts in equilibrium or flat.\n"
         }
-        Start::Settled | Start::Level => "",
+        Start::Level { height } if height > 0.0 => "# The run is dropped; an experiment starts on the floor.\n",
+        Start::Settled | Start::Level { .. } => "",
     };
     let head = format!(
         "# The nominal model of {} with what its diagnosis found, under the drive of run {}.\n# Its time 0 is t_s = {:?} of the run.\n{other_start}",

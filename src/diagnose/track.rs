@@ -127,7 +127,10 @@ pub(super) fn track(
 /// [`EngineError`] if there is no such equilibrium.
 pub(super) fn put(engine: &mut PlanarEngine, robot: &Robot, h: f64, start: &Start, volts: &[f64]) -> Result<(), EngineError> {
     match *start {
-        Start::Level => Ok(()),
+        Start::Level { height } => {
+            engine.raise(height);
+            Ok(())
+        }
         Start::Settled => engine.settle(volts),
         Start::Hung(mass) => {
             let position = robot.material.actuator_length * robot.actuators as f64;
@@ -270,8 +273,8 @@ mod tests {
         for (robot, position, z) in [(clamped(), 10.0, 0.4), (cardstock(), 18.7, -4.25), (cardstock(), 18.7, 2.0)] {
             let settled = heights(&robot, Start::Settled, position, &[0.0, 0.1]);
             assert!((settled[0] - settled[1]).abs() < 1e-8, "{settled:?}");
-            assert_eq!(heights(&robot, Start::Level, position, &[0.0]), [0.0]);
-            for start in [Start::Level, Start::Held { position, z }, Start::Hung(2.0)] {
+            assert_eq!(heights(&robot, Start::Level { height: 0.0 }, position, &[0.0]), [0.0]);
+            for start in [Start::Level { height: 0.0 }, Start::Held { position, z }, Start::Hung(2.0)] {
                 let seen = heights(&robot, start, position, &[0.0, 0.02, 40.0]);
                 assert!((seen[0] - seen[1]).abs() > 1e-3 && (seen[2] - settled[0]).abs() < 1e-3, "{start:?}: {seen:?}");
             }

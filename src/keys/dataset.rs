@@ -111,10 +111,12 @@ const EFFECT: Section = Section {
 pub(super) const RELEASE: Section = Section {
     name: "run.release",
     heading: "[run.release]",
-    about: "The shape that the run is let go from, at rest: one of hung_g, level, and held with held_z_mm.",
+    about: "The shape that the run is let go from, at rest: one of hung_g, level, and held with held_z_mm. A robot with mount = \"ground\" is dropped from height_mm.",
     keys: &[
         key("hung_g", Number(Inside(0.0, 1e3)), Else("none"), "in equilibrium with a mass at the right end, which is cut off"),
-        key("level", Other("true"), Else("none"), "all joints at zero angle"),
+        key("level", Other("true"), Else("none"), "all joints at zero angle ..."),
+        key("height_mm", Number(Between(0.0, 1e3)), Is("0.0"), "... this high above the floor")
+            .with("level = true and mount = \"ground\""),
         key("held", Text, Else("none"), "in equilibrium with this marker held by a vertical force ..."),
         key("held_z_mm", Number(Any), Else("none"), "... at this height above the left end"),
         key(

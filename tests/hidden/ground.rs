@@ -36,7 +36,8 @@ pub const ACTUATORS: usize = 3;
 /// Markers along the robot (cm).
 const MARKERS: [(&str, f64); 3] = [("left", 0.0), ("middle", 15.0), ("right", 30.0)];
 
-const ROBOT: &str = r#"
+/// Tables of the nominal robot.
+pub const ROBOT: &str = r#"
 [material]
 preset = "parameter-2"
 

@@ -13,9 +13,11 @@ use crate::words::{self, number};
 
 /// Largest hung mass (g).
 const MOST_GRAMS: f64 = 1e3;
+/// Largest height (mm) from which a robot is dropped.
+const HIGHEST_MM: f64 = 1e3;
 /// Rows this near to the end of a stretch (s) belong to it.
 const SAME_TIME: f64 = 1e-9;
-const SHAPES: &str = "hung_g = ... (a mass at the right end), level = true, or held = \"MARKER\" with held_z_mm = ...";
+const SHAPES: &str = "hung_g = ... (a mass at the right end), level = true (from height_mm on the floor), or held = \"MARKER\" with held_z_mm = ...";
 
 /// A config with the keys of `[robot]` and `[material]` that are given anew.
 ///
@@ -220,6 +222,14 @@ impl Reader<'_> {
             return wrong(&["release", "at_s"], format!("is {at}, but must be a number"));
         }
         let clamped = robot.mount == Mount::Clamped;
+        let height = release.height_mm.unwrap_or(0.0);
+        if release.height_mm.is_some() && (robot.mount != Mount::Ground || release.level != Some(true)) {
+            return wrong(&["release", "height_mm"], "needs level = true and mount = \"ground\"".into());
+        }
+        if !(0.0..=HIGHEST_MM).contains(&height) {
+            let reason = format!("is {}, but must be from 0 to {HIGHEST_MM} mm", number(height));
+            return wrong(&["release", "height_mm"], reason);
+        }
         match release {
             Release { hung_g: Some(hung), level: None, held: None, held_z_mm: None, .. } => {
                 if !(*hung > 0.0 && *hung <= MOST_GRAMS) {
@@ -231,7 +241,9 @@ impl Reader<'_> {
                 }
                 Ok(Start::Hung(*hung))
             }
-            Release { hung_g: None, level: Some(true), held: None, held_z_mm: None, .. } => Ok(Start::Level),
+            Release { hung_g: None, level: Some(true), held: None, held_z_mm: None, .. } => {
+                Ok(Start::Level { height: 0.1 * height })
+            }
             Release { hung_g: None, level: None, held: Some(name), held_z_mm: Some(z), .. } => {
                 let names: Vec<&str> = self.markers.iter().map(|marker| marker.name.as_str()).collect();
                 let Some(at) = names.iter().position(|known| known == name) else {

@@ -258,6 +258,14 @@ impl PlanarEngine {
         self.gravity_vector = gravity_vector(self.gravity, angle);
     }
 
+    /// Lifts a free robot by `height` (cm).
+    pub(crate) fn raise(&mut self, height: f64) {
+        if !self.clamped() {
+            self.centre[1] += height;
+            self.finite = false;
+        }
+    }
+
     fn clamped(&self) -> bool {
         self.mount == Mount::Clamped
     }
