@@ -44,6 +44,7 @@ impl Search<'_> {
                 (self.progress)(&self.adopting(&worthy, &best));
                 self.settled(worthy)
             });
+            let settled = settled.map(|settled| self.or_another_form_once_settled(settled, &trials));
             let settled = settled.map(|settled| self.or_a_name_once_settled(settled, &trials));
             first.get_or_insert(trials);
             let Some(settled) = settled else { break };
@@ -95,6 +96,27 @@ impl Search<'_> {
         });
         let best = with_laws.min_by(|a, b| self.judged(a).total_cmp(&self.judged(b)));
         best.filter(|best| !self.is_closer(&free, best)).unwrap_or(free)
+    }
+
+    /// A model, or one with another free form in the place of its last one, if that cost hardly more and costs less with all that suits it: the discretisation of the search
+    /// lets the curve of a clamp look better than that of the joints, both of which stand for a part of the stiffness.
+    fn or_another_form_once_settled(&mut self, free: Scored, trials: &[Trial]) -> Scored {
+        let is_last = |trial: &&Trial| free.model().terms.last().is_some_and(|term| term.candidate == trial.candidate);
+        let own = trials.iter().find(is_last).filter(|_| self.ends_free(free.model()));
+        let Some(most) = own.map(|own| self.cost(&own.scored) + self.tolerance()) else { return free };
+        let is_near = |trial: &&Trial| !is_last(trial) && self.ends_free(trial.scored.model()) && self.cost(&trial.scored) < most;
+        let others: Vec<Scored> = trials.iter().filter(is_near).map(|trial| trial.scored.clone()).collect();
+        let mut best = (self.estimator.state(), free);
+        for other in others {
+            let before = self.estimator.state();
+            if let Some(other) = self.settled(other).filter(|other| self.cost(other) < self.cost(&best.1)) {
+                (self.progress)(&self.adopting(&other, &best.1));
+                best = (self.estimator.state(), other);
+            }
+            self.estimator.restore(before);
+        }
+        self.estimator.restore(best.0);
+        best.1
     }
 
     /// A model, or the best name of its last free form's place with all that suits the name, if the free form leaves much and the name then costs less: times of jumps
@@ -366,6 +388,23 @@ mod tests {
         // One that leaves more than the name on select runs, the least on all, is not.
         assert_eq!(adopted(&[trial(1, 900.0, 1800.0), named.clone(), trial(2, 1010.0, 1500.0)]), 1);
         assert_eq!(adopted(&[named, trial(2, 1010.0, 1500.0)]), 0);
+    }
+
+    #[test]
+    fn of_free_forms_that_cost_as_much_in_the_first_discretisation_the_least_costly_one_in_its_own_is_adopted() {
+        // The finer discretisation has the wave `other`; without it, `first` leaves more than `between` by less than discretisations may differ by, with it nothing.
+        let mut plant = Waves::new(&[("first", 1.84), ("other", 1.0)]);
+        plant.resolutions = vec![1.0, 2.0];
+        plant.candidates = ["between", "first"].map(candidate).to_vec();
+        plant.candidates.iter_mut().for_each(|free| free.is_free_form = true);
+        let mut search = search(&plant);
+        let calibrated = search.calibrated(1.0).unwrap();
+        let trials = search.trials(&calibrated).unwrap().0;
+        let between = search.top(&trials).unwrap();
+        assert_eq!(search.id(between.model().terms[0].candidate), "between");
+        let (best, _) = search.forward(calibrated).unwrap();
+        let ids: Vec<&str> = best.model().terms.iter().map(|term| search.id(term.candidate)).collect();
+        assert_eq!((ids, best.model().resolution), (vec!["first"], 2.0));
     }
 
     #[test]
