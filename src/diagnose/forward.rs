@@ -104,19 +104,10 @@ impl Search<'_> {
         let is_last = |trial: &&Trial| free.model().terms.last().is_some_and(|term| term.candidate == trial.candidate);
         let own = trials.iter().find(is_last).filter(|_| self.ends_free(free.model()));
         let Some(most) = own.map(|own| self.cost(&own.scored) + self.tolerance()) else { return free };
-        let is_near = |trial: &&Trial| !is_last(trial) && self.ends_free(trial.scored.model()) && self.cost(&trial.scored) < most;
-        let others: Vec<Scored> = trials.iter().filter(is_near).map(|trial| trial.scored.clone()).collect();
-        let mut best = (self.estimator.state(), free);
-        for other in others {
-            let before = self.estimator.state();
-            if let Some(other) = self.settled(other).filter(|other| self.cost(other) < self.cost(&best.1)) {
-                (self.progress)(&self.adopting(&other, &best.1));
-                best = (self.estimator.state(), other);
-            }
-            self.estimator.restore(before);
-        }
-        self.estimator.restore(best.0);
-        best.1
+        let is_near = |trial: &&Trial| self.ends_free(trial.scored.model()) && self.cost(&trial.scored) < most;
+        let others = trials.iter().filter(|trial| !is_last(trial)).filter(is_near);
+        let others: Vec<Scored> = others.map(|trial| trial.scored.clone()).collect();
+        others.into_iter().fold(free, |best, other| self.or_once_settled(best, other))
     }
 
     /// A model, or the best name of its last free form's place with all that suits the name, if the free form leaves much and the name then costs less: times of jumps
@@ -124,16 +115,23 @@ impl Search<'_> {
     fn or_a_name_once_settled(&mut self, free: Scored, trials: &[Trial]) -> Scored {
         let leaves_much = self.ends_free(free.model()) && self.above(&free) > VISIBLE;
         let mut names = trials.iter().map(|trial| &trial.scored);
-        let Some(name) = names.find(|name| leaves_much && self.is_name_of(&free, name)) else { return free };
+        match names.find(|name| leaves_much && self.is_name_of(&free, name)) {
+            Some(name) => self.or_once_settled(free, name.clone()),
+            None => free,
+        }
+    }
+
+    /// A model, or another one with all that suits it, if that costs less.
+    fn or_once_settled(&mut self, best: Scored, other: Scored) -> Scored {
         let before = self.estimator.state();
-        match self.settled(name.clone()).filter(|name| self.cost(name) < self.cost(&free)) {
-            Some(name) => {
-                (self.progress)(&self.adopting(&name, &free));
-                name
+        match self.settled(other).filter(|other| self.cost(other) < self.cost(&best)) {
+            Some(other) => {
+                (self.progress)(&self.adopting(&other, &best));
+                other
             }
             None => {
                 self.estimator.restore(before);
-                free
+                best
             }
         }
     }
