@@ -150,6 +150,12 @@ fn a_clamp_that_gives_adds_its_turn_to_the_sag() {
     let values = [("compliance_rad_per_n_m", 0.5), ("hardening_per_rad", hardening)];
     let hard = tip(&run(&with(CANTILEVER, "clamp-compliance", &values), &rest));
     assert!(((hard - stiff) / (0.5 * expected) - 1.0).abs() < 1e-3, "{stiff} {hard} {expected}");
+    // One with unlike sides gives to the weight, which turns it down, by 1 − u.
+    for u in [0.8, -0.4] {
+        let values = [("compliance_rad_per_n_m", 0.5), ("asymmetry", u)];
+        let sag = tip(&run(&with(CANTILEVER, "clamp-compliance", &values), &rest));
+        assert!(((sag - stiff) / ((1.0 - u) * expected) - 1.0).abs() < 1e-3, "{u}: {stiff} {sag} {expected}");
+    }
 }
 
 #[test]
@@ -406,6 +412,11 @@ fn what_cannot_be_applied_is_refused_by_name() {
         ("tip-mass", vec![("mass_g", 0.1), ("position_mm", 400.0)], "end"),
         ("free-clamp", vec![("compliance_2_rad_per_n_m", -0.1)], "between"),
         ("free-clamp", vec![("range_mn_m", 0.0), ("compliance_2_rad_per_n_m", 0.1)], "between"),
+        (
+            "clamp-compliance",
+            vec![("compliance_rad_per_n_m", 0.1), ("hardening_per_rad", 100.0), ("asymmetry", 0.5)],
+            "only one of",
+        ),
         ("weak-actuator", vec![("actuator", 2.0), ("gain", 0.5)], "1 actuators"),
         ("stiffness", vec![("scale", f64::NAN)], "between"),
         ("gain-drift", vec![("per_run", 0.1), ("run", -9.5)], "at least 0.1"),

@@ -55,13 +55,14 @@ fn motion(engine: &mut dyn Engine, h: f64) -> Vec<f64> {
     angles
 }
 
-const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 31] = [
+const ON_A_CANTILEVER: [(&str, &[(&str, f64)]); 32] = [
     ("tip-mass", &[("mass_g", 0.2)]),
     ("tip-mass", &[("mass_g", 0.3), ("position_mm", 60.0)]),
     ("tip-mass", &[("mass_g", 0.5), ("position_mm", 4.0)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 1e-3)]),
     ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("hardening_per_rad", 300.0)]),
+    ("clamp-compliance", &[("compliance_rad_per_n_m", 2.0), ("asymmetry", 0.5), ("damping_s", 5e-3)]),
     ("air-drag", &[("drag_coefficient", 40.0)]),
     ("free-joint-memory", &[("share_3", 0.05), ("share_4", 0.1)]),
     ("free-moment-of-deviation", &[("low_per_m", -4.0), ("high_per_m", 4.0), ("above_2_mn_m", 1.0), ("below_3_mn_m", -0.5)]),

@@ -35,6 +35,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
             _ => String::new(),
         },
         "creep" => match (given("rungs_per_decade"), fitted.nth(2)) {
+            (Some(0.0), Some("activation_v")) => "with an activated rate".into(),
             (Some(0.0), _) => "one time constant".into(),
             (Some(_), Some("fastest_s")) => "from a time on that is fitted".into(),
             (Some(_), Some("voltage_exponent")) => "that grows faster than the voltage".into(),
@@ -86,6 +87,7 @@ pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Ite
         "clamp-shift" => fitted.nth(1).map_or("", |_| "with a damper").into(),
         "clamp-compliance" => match fitted.nth(1) {
             Some("hardening_per_rad") => "that hardens".into(),
+            Some("asymmetry") => "with unlike sides".into(),
             Some(_) => "with a damper".into(),
             None => String::new(),
         },
@@ -123,6 +125,7 @@ pub fn parameter(id: &str, name: &str) -> String {
         ("creep", "per_decade") => "growth in a decade of time".into(),
         ("creep", "fastest_s") => "fastest time constant".into(),
         ("creep", "power") => "exponent of the growth".into(),
+        ("creep", "activation_v") => "distance from which the rate grows exponentially".into(),
         ("creep", "voltage_exponent") => "exponent of the voltage above 1".into(),
         ("remanence", "share") => "share of the voltage that stays".into(),
         ("remanence", "coercive_v") => "coercive voltage".into(),

@@ -413,9 +413,17 @@ pub fn apply(effects: &[Applied], robot: &mut Robot, drive: &mut Drive) -> Resul
             _ => {}
         }
     }
-    if !robot.extensions.clamp_curve.is_rigid() && robot.extensions.clamp_hardening != 0.0 {
-        let message = "cannot stand beside a clamp-compliance with hardening_per_rad: put both into the curve".into();
-        return Err(EffectError::Robot { id: "free-clamp", message });
+    // The clamp has one law beside linear springs in series.
+    let laws = |applied: &Applied| match applied.effect.id {
+        "free-clamp" => 1,
+        "clamp-compliance" => {
+            ["hardening_per_rad", "asymmetry"].into_iter().filter(|name| applied.get(name) != Some(0.0)).count()
+        }
+        _ => 0,
+    };
+    if effects.iter().filter(|applied| !applied.is_off()).map(laws).sum::<usize>() > 1 {
+        let message = "only one of free-clamp, hardening_per_rad and asymmetry may be given: put them into one free-clamp".into();
+        return Err(EffectError::Robot { id: "clamp-compliance", message });
     }
     Ok(())
 }

@@ -6,6 +6,8 @@ pub const CLAMP_POINTS: usize = 7;
 const PIECES: usize = (CLAMP_POINTS - 1) / 2;
 /// A compliance that is less than this share of the largest one counts as that, so that every turn has one moment.
 const LEAST_SHARE: f64 = 1e-3;
+/// Moment to either side over which the compliance changes where it has a jump (dyn·cm), far below what any sheet weighs on its clamp.
+const KINK: f64 = 0.01;
 
 /// A curve of the turn against the moment. Its slope, the compliance, is linear between points and constant beyond the last ones; no compliance is negative,
 /// so the curve rises everywhere.
@@ -34,6 +36,12 @@ impl ClampCurve {
         }
         let compliances = compliances.map(|compliance| compliance.max(LEAST_SHARE * largest));
         Self { width: range / PIECES as f64, compliances }
+    }
+
+    /// A curve with a `compliance` (rad/(dyn·cm)) that is 1 + `asymmetry` times as large for positive moments and 1 − `asymmetry` times for negative ones.
+    pub fn bilinear(compliance: f64, asymmetry: f64) -> Self {
+        let [below, above] = [1.0 - asymmetry, 1.0 + asymmetry].map(|factor| compliance * factor);
+        Self::new(PIECES as f64 * KINK, [below, below, below, compliance, above, above, above])
     }
 
     /// True if the clamp does not turn.
@@ -127,6 +135,19 @@ mod tests {
                     // Where the compliance is a thousandth of the largest, rounding of the turn weighs a thousand times as much.
                     assert!((found - given).abs() < 1e-10 * 3e4, "{compliances:?} {added}: {found} not {given}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bilinear_curve_turns_by_another_compliance_to_either_side() {
+        for (asymmetry, [below, above]) in [(0.6, [0.8e-7, 3.2e-7]), (-0.25, [2.5e-7, 1.5e-7]), (1.0, [4e-10, 4e-7])] {
+            let curve = ClampCurve::bilinear(2e-7, asymmetry);
+            for moment in [-3e4, -50.0, 0.0, 50.0, 3e4] {
+                let turn = moment * if moment < 0.0 { below } else { above };
+                // The kink's half width times the difference of the compliances, at most 0.01 dyn·cm by the stiffer one.
+                let error = curve.moment(turn, 0.0) - moment;
+                assert!(error.abs() <= 0.5 * KINK * (below.max(above) / below.min(above)), "{asymmetry} {moment}: {error}");
             }
         }
     }
