@@ -28,22 +28,12 @@ pub fn cause(id: &str) -> String {
 pub fn form<'a>(id: &str, fixed: &[(impl AsRef<str>, f64)], mut fitted: impl Iterator<Item = &'a str>) -> String {
     let given = |name: &str| fixed.iter().find(|(key, _)| key.as_ref() == name).map(|(_, value)| *value);
     match id {
-        "hysteresis" => {
-            let side = match given("poled") {
-                Some(1.0) => ", come from above",
-                Some(-1.0) => ", come from below",
-                _ => "",
-            };
-            match (given("plays"), given("from_zero")) {
-                (Some(0.0), _) => {
-                    format!("Bouc–Wen{}{side}", fitted.find(|name| *name == "exponent").map_or("", |_| " with an exponent"))
-                }
-                (Some(_), Some(1.0)) => "plays that come from 0 V (Prandtl–Ishlinskii)".into(),
-                (Some(_), _) if !side.is_empty() => format!("plays{side} (Prandtl–Ishlinskii)"),
-                (Some(_), _) => "plays at rest at the first voltage (Prandtl–Ishlinskii)".into(),
-                _ => String::new(),
-            }
-        }
+        "hysteresis" => match (given("plays"), given("from_zero")) {
+            (Some(0.0), _) => "Bouc–Wen".into(),
+            (Some(_), Some(1.0)) => "plays that come from 0 V (Prandtl–Ishlinskii)".into(),
+            (Some(_), _) => "plays at rest at the first voltage (Prandtl–Ishlinskii)".into(),
+            _ => String::new(),
+        },
         "creep" => match (given("rungs_per_decade"), fitted.nth(2)) {
             (Some(0.0), Some("activation_v")) => "with an activated rate".into(),
             (Some(0.0), _) => "one time constant".into(),

@@ -13,9 +13,6 @@
 //! between 0 and 1500 V opens by 1500 V · width at its middle. The plays start at rest at the first voltage, or (`from_zero = 1`) have come to it
 //! from 0 V.
 //!
-//! `poled = 1`: the domains have come to the first voltage from far above it, as after poling: h is at its limit, and the first way down has no turning point behind it.
-//! `poled = -1`: from far below.
-//!
 //! g is a convention: `gain`, or (`pinned = 1`) the one with which a steady loop between 0 and 1500 V has the secant 1, so that the gain over a full
 //! stroke is left to `actuation-gain`.
 //!
@@ -30,7 +27,6 @@
 //! * `from_zero` (–): 1: the plays have come to the first voltage from 0 V; 0: they start at rest there (Prandtl-Ishlinskii)
 //! * `decay_per_kv` (1/kV): exponential decay of the plays' weights with the radius (Prandtl-Ishlinskii)
 //! * `pinned` (–): 1: the gain follows from the loop, so that a full stroke of 1500 V is as long with it as without; 0: it is gain
-//! * `poled` (–): 1: come to the first voltage from far above, -1: from far below, 0: neither
 //!
 //! # Source
 //! Data sheet of the MFC actuator (width about 0.2); asymmetric loops: Fu et al., Sens. Actuators A 346 (2022) 113830.
@@ -62,7 +58,7 @@ pub const HYSTERESIS: Effect = Effect {
             about: "A: loss of gain at a turning point (Bouc-Wen)",
         },
         Parameter { name: "asymmetry", unit: "", bounds: [-0.9, 1.0], off: None, default: Some(0.0), about: "c/b (Bouc-Wen)" },
-        Parameter { name: "exponent", unit: "", bounds: [1.0, 4.0], off: None, default: Some(1.0), about: "n (Bouc-Wen)" },
+        Parameter { name: "exponent", unit: "", bounds: [1.0, 2.0], off: None, default: Some(1.0), about: "n (Bouc-Wen)" },
         Parameter {
             name: "plays",
             unit: "",
@@ -104,51 +100,31 @@ pub const HYSTERESIS: Effect = Effect {
             default: Some(0.0),
             about: "1: the gain follows from the loop, so that a full stroke of 1500 V is as long with it as without; 0: it is gain",
         },
-        Parameter {
-            name: "poled",
-            unit: "",
-            bounds: [-1.0, 1.0],
-            off: None,
-            default: Some(0.0),
-            about: "1: come to the first voltage from far above, -1: from far below, 0: neither",
-        },
     ],
     places: &[Place::VoltageMemory],
     fitting: Fitting::Candidate {
         on: fits::any,
-        variants: &[
-            Form { given: &[("plays", 0.0), ("pinned", 1.0)], ..BENT },
-            Form { given: &[("plays", 0.0), ("poled", 1.0), ("pinned", 1.0)], ..BENT },
-            Form { given: &[("plays", 0.0), ("poled", -1.0), ("pinned", 1.0)], ..BENT },
-        ],
+        variants: &[],
         forms: &[
             Form {
                 fitted: &[("width", 0.05), ("slope_loss", 0.2), ("asymmetry", 0.3)],
                 starts: &[&[0.05, 0.2, 0.0], &[0.2, 0.6, 0.0]],
                 given: &[("exponent", 1.0), ("plays", 0.0), ("pinned", 1.0)],
             },
-            Form { given: &[("plays", 1.0), ("from_zero", 0.0), ("pinned", 1.0)], ..PLAYS },
-            Form { given: &[("plays", 1.0), ("from_zero", 1.0), ("pinned", 1.0)], ..PLAYS },
-            Form { given: &[("plays", 1.0), ("poled", 1.0), ("pinned", 1.0)], ..PLAYS },
-            Form { given: &[("plays", 1.0), ("poled", -1.0), ("pinned", 1.0)], ..PLAYS },
+            Form {
+                fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                starts: &[&[0.05, 0.0, 1.0], &[0.2, 0.5, 1.0]],
+                given: &[("plays", 1.0), ("from_zero", 0.0), ("pinned", 1.0)],
+            },
+            Form {
+                fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
+                starts: &[&[0.05, 0.0, 1.0]],
+                given: &[("plays", 1.0), ("from_zero", 1.0), ("pinned", 1.0)],
+            },
         ],
     },
     shape: None,
     action: Action::Voltages(|p, n, _| if p[4] < 0.5 { Box::new(BoucWen::new(p, n)) } else { Box::new(Plays::new(p, n)) }),
-};
-
-/// Prandtl-Ishlinskii.
-const PLAYS: Form = Form {
-    fitted: &[("width", 0.05), ("shape", 0.5), ("decay_per_kv", 2.0)],
-    starts: &[&[0.05, 0.0, 1.0], &[0.2, 0.5, 1.0]],
-    given: &[],
-};
-
-/// Bouc-Wen with an exponent.
-const BENT: Form = Form {
-    fitted: &[("width", 0.05), ("slope_loss", 0.2), ("exponent", 1.0)],
-    starts: &[&[0.05, 0.2, 2.0], &[0.2, 0.6, 2.0]],
-    given: &[],
 };
 
 /// Stroke to which the width refers (V).
@@ -175,11 +151,6 @@ fn secants_of(stage: &mut dyn SignalStage) -> [f64; 2] {
     [first / STROKE, (high - low) / STROKE]
 }
 
-/// From where the first voltage has been reached: 1 from far above, −1 from far below, 0 neither.
-fn side(poled: f64) -> f64 {
-    poled.round()
-}
-
 struct BoucWen {
     /// A.
     slope: f64,
@@ -192,8 +163,6 @@ struct BoucWen {
     limit: f64,
     /// g.
     gain: f64,
-    /// h/h_max at the start.
-    first: f64,
     /// V of every actuator (V).
     volts: Vec<f64>,
     /// h/h_max of every actuator.
@@ -219,7 +188,6 @@ impl BoucWen {
             exponent: p[3],
             limit: 0.5 * STROKE * p[0] / gain,
             gain,
-            first: -side(p[10]),
             volts: vec![0.0; actuators],
             state: vec![0.0; actuators],
         }
@@ -235,8 +203,8 @@ impl BoucWen {
 impl SignalStage for BoucWen {
     fn settle(&mut self, volts: &mut [f64]) {
         self.volts.copy_from_slice(volts);
-        self.state.fill(self.first);
-        volts.iter_mut().for_each(|v| *v = self.gain * (*v - self.limit * self.first));
+        self.state.fill(0.0);
+        volts.iter_mut().for_each(|v| *v *= self.gain);
     }
 
     fn pass(&mut self, _dt: f64, volts: &mut [f64]) {
@@ -287,8 +255,7 @@ struct Plays {
     radii: [f64; RADII],
     /// g.
     gain: f64,
-    /// Where the plays were before the first voltage (V); none for the first voltage.
-    before: Option<f64>,
+    from_zero: bool,
     /// p_i (V), actuators × plays.
     plays: Vec<f64>,
 }
@@ -304,18 +271,14 @@ impl Plays {
         // A play of radius r follows all of a stroke S but 2 r.
         let lost: f64 = raw.iter().zip(&radii).map(|(w, r)| scale * w * (2.0 * r / STROKE).min(1.0)).sum();
         let gain = if p[9] < 0.5 { p[6] } else { 1.0 + lost };
-        let before = match side(p[10]) {
-            0.0 => (p[7] > 0.5).then_some(0.0),
-            side => Some(side * f64::INFINITY),
-        };
-        Self { weights: raw.map(|w| scale * w / gain), radii, gain, before, plays: vec![0.0; RADII * actuators] }
+        Self { weights: raw.map(|w| scale * w / gain), radii, gain, from_zero: p[7] > 0.5, plays: vec![0.0; RADII * actuators] }
     }
 }
 
 impl SignalStage for Plays {
     fn settle(&mut self, volts: &mut [f64]) {
         for (plays, volts) in self.plays.chunks_exact_mut(RADII).zip(&*volts) {
-            plays.fill(self.before.unwrap_or(*volts));
+            plays.fill(if self.from_zero { 0.0 } else { *volts });
         }
         self.pass(0.0, volts);
     }
@@ -368,10 +331,10 @@ mod tests {
     fn the_opening_of_the_loop_is_the_width_at_any_rate() {
         for step in [1.0, 15.0] {
             // With a steep slope the Bouc-Wen state is at its limit half way.
-            let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3, 0.0, 0.0, 0.0, 0.0], 1), step);
+            let bouc_wen = opening(&mut BoucWen::new(&[0.1, 1.0, 0.0, 1.0, 0.0, 0.0, 1.3, 0.0, 0.0, 0.0], 1), step);
             assert!((bouc_wen / 150.0 - 1.0).abs() < 1e-3, "{bouc_wen}");
         }
-        let plays = opening(&mut Plays::new(&[0.1, 0.0, 0.0, 1.0, 1.0, 0.5, 1.3, 0.0, 1.0, 0.0, 0.0], 1), 15.0);
+        let plays = opening(&mut Plays::new(&[0.1, 0.0, 0.0, 1.0, 1.0, 0.5, 1.3, 0.0, 1.0, 0.0], 1), 15.0);
         assert!((plays / 150.0 - 1.0).abs() < 1e-9, "{plays}");
     }
 
@@ -381,7 +344,7 @@ mod tests {
         for exponent in [1.0, 1.5, 2.0] {
             for asymmetry in [-0.9, 0.0, 1.0] {
                 for (width, volts) in [(1e-9, 1500.0), (1e-300, 1.0), (0.2, 1e10), (0.2, 1e300)] {
-                    let mut hysteresis = BoucWen::new(&[width, 0.5, asymmetry, exponent, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 1);
+                    let mut hysteresis = BoucWen::new(&[width, 0.5, asymmetry, exponent, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 1);
                     let start = std::time::Instant::now();
                     hysteresis.settle(&mut [0.0]);
                     for sign in [1.0, -1.0, 1.0] {
@@ -409,20 +372,20 @@ mod tests {
             ends[1] - ends[0]
         };
         for (width, slope, asymmetry) in [(0.1, 0.5, 0.0), (0.4, 1.0, 0.3), (0.05, 0.2, -0.5)] {
-            let bouc_wen = range(&mut BoucWen::new(&[width, slope, asymmetry, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0], 1));
+            let bouc_wen = range(&mut BoucWen::new(&[width, slope, asymmetry, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0], 1));
             // A loop that is not symmetric differs between the two directions of the stroke.
             let limit = if asymmetry == 0.0 { 1e-6 } else { 0.02 };
             assert!((bouc_wen / 1500.0 - 1.0).abs() < limit, "{width} {slope}: {bouc_wen}");
         }
         for decay in [0.0, 5.0] {
-            let plays = range(&mut Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 0.0, decay, 1.0, 0.0], 1));
+            let plays = range(&mut Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 0.0, decay, 1.0], 1));
             assert!((plays / 1500.0 - 1.0).abs() < 1e-12, "{plays}");
         }
     }
 
     #[test]
     fn a_minor_loop_closes() {
-        let mut plays = Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 1.0, 0.0, 0.0, 0.0], 1);
+        let mut plays = Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, 1.0, 0.0, 0.0], 1);
         plays.settle(&mut [0.0]);
         let mut at = |volts: f64| {
             let mut out = [volts];
@@ -433,38 +396,5 @@ mod tests {
         let before = at(-600.0);
         at(-900.0);
         assert!((at(-600.0) - before).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_poled_start_is_where_a_way_from_far_away_ends() {
-        let stages: [&dyn Fn(f64) -> Box<dyn SignalStage>; 2] =
-            [&|poled| Box::new(BoucWen::new(&[0.2, 0.5, 0.3, 1.5, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, poled], 1)), &|poled| {
-                Box::new(Plays::new(&[0.2, 0.0, 0.0, 1.0, 1.0, 0.5, 1.2, 0.0, 1.0, 0.0, poled], 1))
-            }];
-        for stage in stages {
-            for side in [1.0, -1.0] {
-                let (mut come, mut poled) = (stage(0.0), stage(side));
-                come.settle(&mut [0.0]);
-                for volts in [20_000.0 * side, 300.0] {
-                    come.pass(1.0, &mut [volts]);
-                }
-                let mut first = [300.0];
-                poled.settle(&mut first);
-                let rest = {
-                    let mut volts = [300.0];
-                    stage(0.0).settle(&mut volts);
-                    volts[0]
-                };
-                assert!((first[0] - rest) * side > 10.0, "{} {rest}", first[0]);
-                for volts in [300.0, -1200.0, 100.0] {
-                    let [a, b] = [&mut come, &mut poled].map(|stage| {
-                        let mut out = [volts];
-                        stage.pass(1.0, &mut out);
-                        out[0]
-                    });
-                    assert!((a - b).abs() < 1e-6, "{side} {volts}: {a} {b}");
-                }
-            }
-        }
     }
 }
