@@ -11,7 +11,7 @@
 //! (ids after `turning:`), `a+b` for two at once, `several:K` for K effects drawn from the seed.
 //!
 //! `EFFECT~FORM` is an effect by another equation (tests/hidden/forms.rs), `forms` stands for all of them, in the sizes 0 and 1; it is found if the
-//! effect is named. 42 of the 60 forms are only for judging: no limit of the program may be set with them. A fault of the bench comes before any id:
+//! effect is named. 40 of the 60 forms are only for judging: no limit of the program may be set with them. A fault of the bench comes before any id:
 //! `clock:`, `zero:`, `gain:`, `drift:`, `ar:`, `fps60:`, `fps120:`, `sigma2:`, `sigmahalf:`, `nosigma:`, or `bench:` for all of them but the drift
 //! (tests/hidden/bench.rs); `bench` stands for some effects on such a bench.
 
