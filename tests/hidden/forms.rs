@@ -1,8 +1,8 @@
 //! Other forms of the effects: the same cause by another equation than the library's and than the first one of this simulator.
 //!
 //! An id is `EFFECT~FORM`. The forms of an effect come in a fixed order, the effects in the order of `FORMS`. Those that limits may be set with: forms
-//! 1 and 2 of the effects 1, 3, 5, ... and form 1 of the effects 2, 4, 6, ...; and those whose law is in the library by now (`IN_THE_LIBRARY`). All others are only for judging (`is_for_judging`): do not look at single
-//! answers to them while a limit is chosen.
+//! 1 and 2 of the effects 1, 3, 5, ... and form 1 of the effects 2, 4, 6, ...; and those whose law is in the library by now (`IN_THE_LIBRARY`). All
+//! others are only for judging (`is_for_judging`): do not look at single answers to them while a limit is chosen.
 
 use super::Hidden;
 use super::curves::{self, Operator};
