@@ -425,6 +425,20 @@ fn what_cannot_be_applied_is_refused_by_name() {
         let error = experiment::experiment(&Source::from_text("x.toml", with(CANTILEVER, id, &values))).unwrap_err().to_string();
         assert!(error.contains(word) && error.contains("x.toml"), "{id}: {error}");
     }
+    // One law of the clamp, beside linear springs in series.
+    let harder: (&str, &[(&str, f64)]) = ("clamp-compliance", &[("compliance_rad_per_n_m", 0.1), ("hardening_per_rad", 100.0)]);
+    let unlike: (&str, &[(&str, f64)]) = ("clamp-compliance", &[("compliance_rad_per_n_m", 0.1), ("asymmetry", 0.5)]);
+    let curve: (&str, &[(&str, f64)]) = ("free-clamp", &[("compliance_2_rad_per_n_m", 0.1)]);
+    let linear: (&str, &[(&str, f64)]) = ("clamp-compliance", &[("compliance_rad_per_n_m", 0.1)]);
+    for (one, other) in [(harder, harder), (harder, unlike), (unlike, unlike), (unlike, curve), (curve, harder), (curve, curve)] {
+        let two = |other: (&str, &[(&str, f64)])| {
+            let text = with(&with(CANTILEVER, one.0, one.1), other.0, other.1);
+            experiment::experiment(&Source::from_text("x.toml", text))
+        };
+        let error = two(other).unwrap_err().to_string();
+        assert!(error.contains("only one of") && error.contains("x.toml"), "{one:?} {other:?}: {error}");
+        assert!(two(linear).is_ok(), "{one:?}");
+    }
     assert!(effects::find("hysteresis").is_some());
 }
 

@@ -38,7 +38,8 @@ impl ClampCurve {
         Self { width: range / PIECES as f64, compliances }
     }
 
-    /// A curve with a `compliance` (rad/(dyn·cm)) that is 1 + `asymmetry` times as large for positive moments and 1 − `asymmetry` times for negative ones.
+    /// A curve with a `compliance` (rad/(dyn·cm)) that is 1 + `asymmetry` times as large for positive moments and 1 − `asymmetry` times for negative
+    /// ones, but at least a thousandth of the other side's.
     pub fn bilinear(compliance: f64, asymmetry: f64) -> Self {
         let [below, above] = [1.0 - asymmetry, 1.0 + asymmetry].map(|factor| compliance * factor);
         Self::new(PIECES as f64 * KINK, [below, below, below, compliance, above, above, above])
@@ -145,7 +146,7 @@ mod tests {
             let curve = ClampCurve::bilinear(2e-7, asymmetry);
             for moment in [-3e4, -50.0, 0.0, 50.0, 3e4] {
                 let turn = moment * if moment < 0.0 { below } else { above };
-                // The kink's half width times the difference of the compliances, at most 0.01 dyn·cm by the stiffer one.
+                // Over the kink the mean compliance is wrong by less than half the softer side's: that turn, by the compliance of the side.
                 let error = curve.moment(turn, 0.0) - moment;
                 assert!(error.abs() <= 0.5 * KINK * (below.max(above) / below.min(above)), "{asymmetry} {moment}: {error}");
             }

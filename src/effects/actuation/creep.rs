@@ -215,7 +215,7 @@ fn relaxed(activation: f64, away: f64, constants: f64) -> [f64; 2] {
         (activation * ((1.0 + part) / (gone + still * 2.0 * w / (1.0 + w))).ln()).copysign(away)
     };
     let end = left(constants);
-    // By Simpson's rule.
+    // By Simpson's rule: in the very step of a jump too much, by less than a sixth of the jump.
     [(away + 4.0 * left(0.5 * constants) + end) / 6.0, end]
 }
 
